@@ -1,0 +1,6 @@
+"""Experts that know how to move a Go1: a model predictive controller on Pinocchio dynamics, solved by OSQP."""
+
+from experts.mpc import MPC, MPCConfig
+from experts.nmpc import NMPCConfig, NMPCExpert
+
+__all__ = ["MPC", "MPCConfig", "NMPCConfig", "NMPCExpert"]

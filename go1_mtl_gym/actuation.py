@@ -1,0 +1,67 @@
+"""The joint actuators: a PD law, its inverse, and the map between actions and joint targets."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from go1_mtl_gym import robot
+from go1_mtl_gym.validation import number_in
+
+
+@dataclass(frozen=True)
+class PDGains:
+    """Gains of tau = kp (a - q) - kd v, the same for all joints and all tasks.
+
+    Attributes:
+        kp: stiffness [N m/rad].
+        kd: damping [N m s/rad].
+
+    Raises:
+        InvalidInputError: if kp is outside [5, 500] or kd outside [0, 20].
+    """
+
+    kp: float = 50.0
+    kd: float = 2.0
+
+    def __post_init__(self) -> None:
+        number_in(self.kp, 5.0, 500.0, "kp [N m/rad]")
+        number_in(self.kd, 0.0, 20.0, "kd [N m s/rad]")
+
+    def torque(self, target: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Torque before the limits [N m], shape (12,): tau = kp (a - q) - kd v."""
+        return self.kp * (target - q) - self.kd * v
+
+    def target(self, tau: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """The joint target that yields a torque [rad], shape (12,): a = q + (tau + kd v)/kp (arXiv 2505.08574)."""
+        return q + (tau + self.kd * v) / self.kp
+
+
+@dataclass(frozen=True)
+class ActionMap:
+    """Affine map between actions in [-1, 1] and joint targets in radians: target = center + half_range * action.
+
+    The range is the joint range widened by (tau_max + kd v_max)/kp, so it holds the target of every torque within the
+    limits at every joint position and speed within theirs.
+
+    Attributes:
+        center: shape (12,) [rad].
+        half_range: shape (12,) [rad].
+    """
+
+    center: np.ndarray
+    half_range: np.ndarray
+
+    @classmethod
+    def for_gains(cls, gains: PDGains) -> "ActionMap":
+        """The map that belongs to one pair of gains."""
+        margin = (robot.TORQUE_LIMIT + gains.kd * robot.SPEED_LIMIT) / gains.kp
+        low, high = robot.JOINT_LOWER - margin, robot.JOINT_UPPER + margin
+        return cls(center=(low + high) / 2, half_range=(high - low) / 2)
+
+    def to_radians(self, action: np.ndarray) -> np.ndarray:
+        """Joint targets [rad] of actions, shape (..., 12)."""
+        return self.center + self.half_range * action
+
+    def from_radians(self, target: np.ndarray) -> np.ndarray:
+        """Actions of joint targets [rad], shape (..., 12), clipped to [-1, 1]."""
+        return np.clip((target - self.center) / self.half_range, -1.0, 1.0)

@@ -1,0 +1,375 @@
+"""The Gymnasium environment of the Go1."""
+
+import copy
+from collections import deque
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+from gymnasium.error import ResetNeeded
+from gymnasium.spaces import Box
+
+from go1_mtl_gym import robot
+from go1_mtl_gym.actuation import ActionMap, PDGains
+from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.observation import PROPRIOCEPTION, ObservationLayout, SensorNoise
+from go1_mtl_gym.rewards import reward_terms
+from go1_mtl_gym.simulation import PHYSICS_HZ, Simulation
+from go1_mtl_gym.state import RobotState
+from go1_mtl_gym.tasks import TASKS, Task
+from go1_mtl_gym.validation import finite_vector, number_in, one_of
+
+COMMAND_FILTER_S = 0.2
+"""Time constant of the low-pass between a command and what expert and student see of it [s]."""
+FALLEN_HEIGHT = 0.14
+"""A trunk lower than this has fallen [m]."""
+FALLEN_COSINE = 0.5
+"""A trunk tilted by more than arccos of this has fallen."""
+RESET_JOINT_NOISE = 0.03
+"""Largest deviation of a joint from the home pose after a reset [rad]."""
+
+
+class Go1Env(gymnasium.Env):
+    """A Unitree Go1 that walks, trots, bounds or jumps on command.
+
+    Observation: a flat float32 Box of 34 raw proprioceptive numbers, the channels asked for, and the one-hot task id;
+    the table is in `go1_mtl_gym.observation`.
+
+    Action: Box(-1, 1, (12,)), an affine map (`action_map`) of 12 desired joint positions, legs FL FR RL RR, joints hip
+    thigh calf. Actuators apply tau = kp (a - q) - kd v at 1 kHz, clipped at 23.7, 23.7, 35.55 N m.
+
+    Reward: velocity and yaw rate tracking, posture, effort, alive; itemised in ``info["reward_terms"]``.
+
+    Episode: starts standing at phase 0 of the gait clock; terminates on a fall (trunk below 0.14 m or tilted by more than
+    60 degrees) or when the physics diverges; truncates after `episode_s`.
+
+    Info: task, command (asked for), filtered_command (seen by expert and student), base_velocity (measured vx, vy, yaw
+    rate in the heading frame), contacts, phase, reward_terms, fallen, ended ("", "fall", "unstable" or "time").
+
+    Version history: v0, first.
+
+    Args:
+        task: name of the task, or None to draw one per episode.
+        tasks: names of the tasks in the one-hot id, in order.
+        channels: optional parts of the observation: "command", "gravity", "phase", "last_action".
+        history: number of proprioceptive frames in the observation.
+        control_hz: rate of `step` [Hz]; a divisor of 1000 from 50 to 1000.
+        kp: stiffness of the actuators [N m/rad].
+        kd: damping of the actuators [N m s/rad].
+        noise: True for the default `SensorNoise`, or one of your own; None for exact sensors.
+        episode_s: length of an episode [s].
+        expert: ``"module:Class"`` or a callable; called with ``gains=PDGains`` on first use, must give an object with
+            ``reset(state)`` and ``action(state)`` that returns 12 joint targets [rad] for a `RobotState`.
+        render_mode: None, "human" or "rgb_array".
+        width, height: size of the picture [pixels].
+
+    Raises:
+        InvalidInputError: if an argument is not as described.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["human", "rgb_array"], "render_fps": 50}
+
+    def __init__(
+        self,
+        task: str | None = "trot",
+        *,
+        tasks: Sequence[str] = tuple(TASKS),
+        channels: Sequence[str] = (),
+        history: int = 1,
+        control_hz: int = 50,
+        kp: float = 50.0,
+        kd: float = 2.0,
+        noise: SensorNoise | bool | None = None,
+        episode_s: float = 30.0,
+        expert: str | Callable[..., Any] = "experts.nmpc:NMPCExpert",
+        render_mode: str | None = None,
+        width: int = 640,
+        height: int = 480,
+    ) -> None:
+        self._arguments = {name: value for name, value in locals().items() if name not in ("self", "__class__")}
+        self.tasks = _checked_tasks(tasks)
+        if task is not None:
+            one_of(task, self.tasks, "task")
+        number_in(control_hz, 50, PHYSICS_HZ, "control_hz")
+        if PHYSICS_HZ % control_hz:
+            raise InvalidInputError(f"control_hz must divide {PHYSICS_HZ}, got {control_hz}")
+        if render_mode is not None:
+            one_of(render_mode, self.metadata["render_modes"], "render_mode")
+        if not (noise is None or isinstance(noise, (bool, SensorNoise))):
+            raise InvalidInputError(f"noise must be None, True, False or a SensorNoise, got {noise!r}")
+        self.control_hz = int(control_hz)
+        self.control_s = 1.0 / self.control_hz
+        self.gains = PDGains(kp, kd)
+        self.action_map = ActionMap.for_gains(self.gains)
+        self.layout = ObservationLayout(self.tasks, channels, history)
+        self.observation_space = Box(self.layout.low, self.layout.high, dtype=np.float32)
+        self.action_space = Box(-1.0, 1.0, (12,), dtype=np.float32)
+        self.render_mode = render_mode
+        self.metadata = self.metadata | {"render_fps": min(self.control_hz, 50)}
+        self._noise = SensorNoise() if noise is True else (noise or None)
+        self._episode_steps = round(number_in(episode_s, 1.0 / control_hz, 1e6, "episode_s") * control_hz)
+        self._simulation = Simulation(self.gains)
+        self._expert: Any = None
+        self._renderer: Any = None
+        self._ready = False
+
+    # -- Gymnasium ---------------------------------------------------------------------------------------------------
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[np.ndarray, dict]:
+        """Begin an episode from a stand.
+
+        Args:
+            seed: of everything random in this environment.
+            options: any of ``command`` (vx, vy, yaw rate; otherwise drawn from the task's range) and ``task`` (a name;
+                otherwise the environment's own, or a drawn one).
+
+        Raises:
+            InvalidInputError: for an unknown option, task or impossible command; the running episode is left as it is.
+        """
+        options = dict(options or {})
+        for name in options:
+            one_of(name, ("command", "task"), "reset option")
+        if options.get("task") is not None:
+            one_of(options["task"], self.tasks, "task")
+        if options.get("command") is not None:
+            TASKS[options.get("task") or self._arguments["task"] or self.tasks[0]].check_command(options["command"])
+        super().reset(seed=seed)
+        name = options.get("task") or self._arguments["task"] or str(self.np_random.choice(self.tasks))
+        self._task = TASKS[name]
+        command = options.get("command")
+        drawn = self._task.draw_command(self.np_random)
+        self._command = drawn if command is None else self._task.check_command(command)
+        self._filtered_command = np.zeros(3)
+        self._phase = 0.0
+        self._steps = 0
+        joint_noise = self.np_random.uniform(-RESET_JOINT_NOISE, RESET_JOINT_NOISE, 12)
+        self._simulation.reset(robot.HOME_POSE + joint_noise)
+        self._last_action = self.action_map.from_radians(robot.HOME_POSE)
+        self._frames: deque[np.ndarray] = deque(maxlen=max(self.layout.history - 1, 1))
+        self._ready = True
+        if self._expert is not None:
+            self._expert.reset(self.state)
+        observation = self._observe()
+        if self.render_mode == "human":
+            self.render()
+        return observation, self._info({}, "")
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict]:
+        """Hold one action for a control period.
+
+        Args:
+            action: shape (12,); entries beyond [-1, 1] are clipped.
+
+        Raises:
+            InvalidInputError: if the action is not 12 finite numbers; nothing is stepped.
+            gymnasium.error.ResetNeeded: before the first `reset`.
+        """
+        self._require_reset("step")
+        self._last_action = np.clip(finite_vector(action, 12, "action"), -1.0, 1.0)
+        self._simulation.step(self.action_map.to_radians(self._last_action), PHYSICS_HZ // self.control_hz)
+        self._phase = (self._phase + self.control_s / self._task.gait.period) % 1.0
+        self._filtered_command += (1 - np.exp(-self.control_s / COMMAND_FILTER_S)) * (
+            self._command - self._filtered_command
+        )
+        self._steps += 1
+        state = self.state
+        ended = self._ended(state)
+        terms = reward_terms(
+            self._task.reward,
+            self._filtered_command,
+            state.base_velocity,
+            state.gravity_b,
+            float(state.position_w[2]),
+            self._simulation.torque,
+        )
+        observation = self._observe(state)
+        if self.render_mode == "human":
+            self.render()
+        terminated = ended in ("fall", "unstable")
+        return observation, sum(terms.values()), terminated, ended == "time", self._info(terms, ended, state)
+
+    def render(self) -> np.ndarray | None:
+        """Draw the robot, its feet's contacts and its command; an RGB array (height, width, 3) in "rgb_array" mode."""
+        if self.render_mode is None:
+            gymnasium.logger.warn("render() does nothing: the environment was made without a render_mode")
+            return None
+        self._require_reset("render")
+        if self._renderer is None:
+            from go1_mtl_gym import rendering
+
+            kind = rendering.Viewer if self.render_mode == "human" else rendering.Camera
+            self._renderer = kind(self._simulation, self._arguments["width"], self._arguments["height"])
+        return self._renderer.draw(self.state)
+
+    def close(self) -> None:
+        """Free the renderer; may be called twice."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+    # -- What is particular to the Go1 -------------------------------------------------------------------------------
+
+    @property
+    def task(self) -> Task:
+        """The present task."""
+        self._require_reset("task")
+        return self._task
+
+    @property
+    def simulation(self) -> Simulation:
+        """The robot in MuJoCo, for experiments with its model."""
+        return self._simulation
+
+    @property
+    def state(self) -> RobotState:
+        """All that an expert may read, now."""
+        self._require_reset("state")
+        data = self._simulation.data
+        return RobotState(
+            position_w=data.qpos[:3].copy(),
+            quat_wxyz=data.qpos[3:7].copy(),
+            linear_velocity_w=data.qvel[:3].copy(),
+            angular_velocity_b=data.qvel[3:6].copy(),
+            q=self._simulation.q,
+            v=self._simulation.v,
+            contacts=self._simulation.read().contacts,
+            gait=self._task.gait,
+            phase=self._phase,
+            command=self._filtered_command.copy(),
+        )
+
+    def expert_action(self) -> np.ndarray:
+        """The expert's action for the present state, float32, shape (12,). Changes nothing, here or later."""
+        state = self.state
+        if self._expert is None:
+            self._expert = _load_expert(self._arguments["expert"])(gains=self.gains)
+            self._expert.reset(state)
+        return self.action_map.from_radians(self._expert.action(state)).astype(np.float32)
+
+    def set_task(self, task: str) -> None:
+        """Change the task while running; the gait clock's phase and the command go on.
+
+        Raises:
+            InvalidInputError: if the task is unknown here, or does not allow the present command.
+        """
+        self._require_reset("set_task")
+        new = TASKS[one_of(task, self.tasks, "task")]
+        new.check_command(self._command)
+        self._task = new
+
+    def set_command(self, command: Sequence[float]) -> None:
+        """Ask for another (vx [m/s], vy [m/s], yaw rate [rad/s]); it is low-passed before expert and student see it.
+
+        Raises:
+            InvalidInputError: if it is not three finite numbers within the task's `command_limit`.
+        """
+        self._require_reset("set_command")
+        self._command = self._task.check_command(command)
+
+    def push(self, delta_velocity_w: Sequence[float]) -> None:
+        """Kick the trunk: add to its linear velocity [m/s], world frame, shape (3,).
+
+        Raises:
+            InvalidInputError: if it is not three finite numbers.
+        """
+        self._require_reset("push")
+        self._simulation.push(finite_vector(delta_velocity_w, 3, "push (change of velocity)"))
+
+    # -- Copies ------------------------------------------------------------------------------------------------------
+
+    _RUNNING = (
+        "_task", "_command", "_filtered_command", "_phase", "_steps", "_last_action", "_frames",
+    )  # fmt: skip
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Arguments and running state; a copy continues to the bit, without the original's window or expert."""
+        running = {name: copy.deepcopy(getattr(self, name)) for name in self._RUNNING} if self._ready else None
+        return {
+            "arguments": self._arguments,
+            "running": running,
+            "snapshot": self._simulation.snapshot(),
+            "np_random": copy.deepcopy(self._np_random),
+            "np_random_seed": getattr(self, "_np_random_seed", None),
+        }
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__init__(**state["arguments"])
+        self._simulation.restore(state["snapshot"])
+        self._np_random = state["np_random"]
+        self._np_random_seed = state["np_random_seed"]
+        if state["running"] is not None:
+            self.__dict__.update(state["running"])
+            self._ready = True
+
+    # -- Parts of a step ---------------------------------------------------------------------------------------------
+
+    def _require_reset(self, what: str) -> None:
+        if not self._ready:
+            raise ResetNeeded(f"call reset() before {what}")
+
+    def _ended(self, state: RobotState) -> str:
+        if not self._simulation.stable:
+            return "unstable"
+        if state.position_w[2] < FALLEN_HEIGHT or -state.gravity_b[2] < FALLEN_COSINE:
+            return "fall"
+        return "time" if self._steps >= self._episode_steps else ""
+
+    def _observe(self, state: RobotState | None = None) -> np.ndarray:
+        state = self.state if state is None else state
+        reading = self._simulation.read()
+        turn = 2 * np.pi * self._phase
+        parts = {
+            "accelerometer": reading.accelerometer,
+            "gyroscope": reading.gyroscope,
+            "q": state.q,
+            "dq": state.v,
+            "contacts": reading.contacts,
+            "command": self._filtered_command,
+            "gravity": state.gravity_b,
+            "phase": np.array([np.sin(turn), np.cos(turn)]),
+            "last_action": self._last_action,
+        }
+        if self._noise is not None:
+            self._noise.apply(parts, self.np_random)
+        parts = {name: np.nan_to_num(part) for name, part in parts.items()}
+        frame = np.concatenate([parts[name] for name in PROPRIOCEPTION])
+        if self._steps == 0:
+            self._frames.extend([frame] * self._frames.maxlen)
+        observation = self.layout.flatten(parts, self._frames, self.tasks.index(self._task.name))
+        self._frames.appendleft(frame)
+        return observation
+
+    def _info(self, terms: dict[str, float], ended: str, state: RobotState | None = None) -> dict[str, Any]:
+        state = self.state if state is None else state
+        return {
+            "task": self._task.name,
+            "command": self._command.copy(),
+            "filtered_command": self._filtered_command.copy(),
+            "base_velocity": state.base_velocity,
+            "contacts": state.contacts,
+            "phase": self._phase,
+            "reward_terms": terms,
+            "fallen": ended in ("fall", "unstable"),
+            "ended": ended,
+        }
+
+
+def _checked_tasks(tasks: Sequence[str]) -> tuple[str, ...]:
+    if isinstance(tasks, str) or not tasks:
+        raise InvalidInputError(f'tasks must be a sequence of task names such as ("trot",), got {tasks!r}')
+    for name in tasks:
+        one_of(name, tuple(TASKS), "task")
+    if len(set(tasks)) != len(tasks):
+        raise InvalidInputError(f"tasks must differ from each other, got {tuple(tasks)}")
+    return tuple(tasks)
+
+
+def _load_expert(expert: str | Callable[..., Any]) -> Callable[..., Any]:
+    if callable(expert):
+        return expert
+    module, _, name = expert.partition(":")
+    if not name:
+        raise InvalidInputError(f'expert must be "module:Class" or a callable, got {expert!r}')
+    return getattr(import_module(module), name)

@@ -1,0 +1,99 @@
+"""Gaits as data: when each foot is on the ground, and how high it swings."""
+
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.validation import finite_vector, number_in
+
+
+@dataclass(frozen=True)
+class Gait:
+    """A periodic contact plan.
+
+    The gait clock `phase` counts cycles; leg i is at (phase + offsets[i]) mod 1 of its own cycle, on the ground while
+    that is below `duty` and in the air for the rest.
+
+    Attributes:
+        name: what people call it.
+        period: duration of a cycle [s].
+        duty: share of the cycle that a foot spends on the ground.
+        offsets: phase offset of each leg in cycles, order FL, FR, RL, RR.
+        swing_height: clearance of a foot in the middle of its swing [m].
+
+    Raises:
+        InvalidInputError: if a figure is outside its range.
+    """
+
+    name: str
+    period: float
+    duty: float
+    offsets: tuple[float, float, float, float]
+    swing_height: float = 0.06
+
+    def __post_init__(self) -> None:
+        if not self.name:
+            raise InvalidInputError("a gait needs a name, got an empty string")
+        number_in(self.period, 0.15, 3.0, f"period [s] of gait {self.name!r}")
+        number_in(self.duty, 0.2, 0.95, f"duty of gait {self.name!r}")
+        number_in(self.swing_height, 0.01, 0.2, f"swing_height [m] of gait {self.name!r}")
+        finite_vector(self.offsets, 4, f"offsets of gait {self.name!r}")
+
+    @property
+    def stance_s(self) -> float:
+        """Time on the ground per cycle [s]."""
+        return self.duty * self.period
+
+    @property
+    def swing_s(self) -> float:
+        """Time in the air per cycle [s]."""
+        return (1.0 - self.duty) * self.period
+
+    @property
+    def step_rate(self) -> float:
+        """Touchdowns per leg per second [1/s]."""
+        return 1.0 / self.period
+
+    def leg_phase(self, phase: float | np.ndarray) -> np.ndarray:
+        """Position of each leg in its own cycle, in [0, 1); shape of `phase` + (4,)."""
+        return np.mod(np.asarray(phase, dtype=np.float64)[..., None] + np.array(self.offsets), 1.0)
+
+    def stance(self, phase: float | np.ndarray) -> np.ndarray:
+        """Which legs should be on the ground; bool, shape of `phase` + (4,)."""
+        return self.leg_phase(phase) < self.duty
+
+    def swing_progress(self, phase: float | np.ndarray) -> np.ndarray:
+        """How much of the swing is over, 0 at lift-off and during stance, towards 1 at touchdown."""
+        return np.clip((self.leg_phase(phase) - self.duty) / (1.0 - self.duty), 0.0, 1.0)
+
+    def contact_schedule(self, phase: float, dt: float, steps: int) -> np.ndarray:
+        """Share of each coming interval that a leg spends on the ground.
+
+        Args:
+            phase: the clock now [cycles].
+            dt: length of an interval [s].
+            steps: number of intervals.
+
+        Returns:
+            Shape (steps, 4), in [0, 1]: 1 is on the ground throughout, 0 in the air throughout.
+        """
+        edges = phase + np.arange(steps + 1) * (dt / self.period)
+        turns = edges[:, None] + np.array(self.offsets)
+        ground = np.floor(turns) * self.duty + np.minimum(np.mod(turns, 1.0), self.duty)
+        return np.clip(np.diff(ground, axis=0) / (dt / self.period), 0.0, 1.0)
+
+
+GAITS = MappingProxyType(
+    {
+        gait.name: gait
+        for gait in (
+            Gait("trot", period=0.40, duty=0.55, offsets=(0.0, 0.5, 0.5, 0.0), swing_height=0.06),
+            Gait("bound", period=0.32, duty=0.45, offsets=(0.0, 0.0, 0.5, 0.5), swing_height=0.06),
+            Gait("jump", period=0.45, duty=0.55, offsets=(0.0, 0.0, 0.0, 0.0), swing_height=0.04),
+            Gait("walk", period=0.60, duty=0.78, offsets=(0.25, 0.75, 0.0, 0.5), swing_height=0.06),
+        )
+    }
+)
+"""The built-in gaits by name."""

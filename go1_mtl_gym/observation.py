@@ -1,0 +1,152 @@
+"""The one flat observation: its named slices, its bounds and the noise of its sensors.
+
+| name          | size | unit    | always there | content                                                            |
+|---------------|------|---------|--------------|--------------------------------------------------------------------|
+| accelerometer | 3    | m/s^2   | yes          | specific force at the IMU, trunk frame                             |
+| gyroscope     | 3    | rad/s   | yes          | angular velocity, trunk frame                                      |
+| q             | 12   | rad     | yes          | joint positions                                                    |
+| dq            | 12   | rad/s   | yes          | joint velocities                                                   |
+| contacts      | 4    | 0 or 1  | yes          | feet on the ground, FL FR RL RR                                    |
+| command       | 3    | m/s, rad/s | channel   | filtered (vx, vy, yaw rate)                                        |
+| gravity       | 3    | -       | channel      | unit vector of gravity, trunk frame                                |
+| phase         | 2    | -       | channel      | sine and cosine of the gait clock                                  |
+| last_action   | 12   | -       | channel      | the action applied during the last step                            |
+| history       | 34 (n - 1) | as above | history = n > 1 | the n - 1 proprioceptive frames before this one, newest first |
+| task          | K    | 0 or 1  | yes          | one-hot task id, in the order of the environment's `tasks`         |
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from go1_mtl_gym import robot
+from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.validation import number_in, one_of
+
+PROPRIOCEPTION = MappingProxyType({"accelerometer": 3, "gyroscope": 3, "q": 12, "dq": 12, "contacts": 4})
+"""Sizes of the raw proprioceptive parts; together the 34 numbers of arXiv 2505.08574."""
+CHANNELS = MappingProxyType({"command": 3, "gravity": 3, "phase": 2, "last_action": 12})
+"""Sizes of the parts that are there when asked for."""
+FRAME_SIZE = sum(PROPRIOCEPTION.values())
+
+_BOUND = {
+    "accelerometer": np.full(3, 160.0),  # a 16 g accelerometer saturates here
+    "gyroscope": np.full(3, 35.0),  # a 2000 deg/s gyroscope saturates here
+    "q": np.full(12, 2 * np.pi),
+    "dq": 3 * robot.SPEED_LIMIT,
+    "command": np.array([5.0, 5.0, 5.0]),
+    "gravity": np.ones(3),
+    "phase": np.ones(2),
+    "last_action": np.ones(12),
+}
+
+
+@dataclass(frozen=True)
+class SensorNoise:
+    """Standard deviations of white Gaussian noise added to each reading.
+
+    The defaults are of the size that MEMS inertial units and joint encoders of small quadrupeds show.
+
+    Attributes:
+        accelerometer: [m/s^2].
+        gyroscope: [rad/s].
+        q: [rad].
+        dq: [rad/s].
+        gravity: per component of the unit vector.
+
+    Raises:
+        InvalidInputError: if a figure is negative, above 10, or not a number.
+    """
+
+    accelerometer: float = 0.3
+    gyroscope: float = 0.05
+    q: float = 0.005
+    dq: float = 0.25
+    gravity: float = 0.02
+
+    def __post_init__(self) -> None:
+        for name in ("accelerometer", "gyroscope", "q", "dq", "gravity"):
+            number_in(getattr(self, name), 0.0, 10.0, f"sensor noise of {name}")
+
+    def apply(self, parts: dict[str, np.ndarray], rng: np.random.Generator) -> None:
+        """Add noise to the readings in place, drawing in a fixed order."""
+        for name in ("accelerometer", "gyroscope", "q", "dq", "gravity"):
+            if name in parts:
+                parts[name] = parts[name] + rng.normal(0.0, getattr(self, name), parts[name].shape)
+
+
+class ObservationLayout:
+    """Where each named part stands in the flat observation, and how large it can be.
+
+    Args:
+        tasks: names of the tasks, in the order of the one-hot id.
+        channels: names from `CHANNELS`; they stand in the order of that table whatever the order here.
+        history: number of proprioceptive frames, this one included.
+
+    Attributes:
+        slices: part name -> slice of the observation.
+        size: length of the observation.
+        n_tasks: K.
+        low, high: bounds, float32, shape (size,).
+
+    Raises:
+        InvalidInputError: for an unknown or repeated channel, or a history outside 1 ... 50.
+    """
+
+    def __init__(self, tasks: Sequence[str], channels: Sequence[str] = (), history: int = 1) -> None:
+        if isinstance(channels, str):
+            raise InvalidInputError(f'channels must be a sequence of names such as ("command",), got {channels!r}')
+        for name in channels:
+            one_of(name, tuple(CHANNELS), "channel")
+        if len(set(channels)) != len(channels):
+            raise InvalidInputError(f"channels must differ from each other, got {tuple(channels)}")
+        if not isinstance(history, (int, np.integer)) or not 1 <= history <= 50:
+            raise InvalidInputError(f"history must be an integer from 1 to 50, got {history!r}")
+        self.channels = tuple(name for name in CHANNELS if name in channels)
+        self.history = int(history)
+        self.n_tasks = len(tasks)
+        sizes = dict(PROPRIOCEPTION) | {name: CHANNELS[name] for name in self.channels}
+        if self.history > 1:
+            sizes["history"] = FRAME_SIZE * (self.history - 1)
+        sizes["task"] = self.n_tasks
+        ends = np.cumsum(list(sizes.values()))
+        self.slices: Mapping[str, slice] = MappingProxyType(
+            {name: slice(int(end) - size, int(end)) for (name, size), end in zip(sizes.items(), ends, strict=True)}
+        )
+        self.size = int(ends[-1])
+        self.low, self.high = self._bounds()
+
+    def _bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        high = np.ones(self.size)
+        for name, where in self.slices.items():
+            if name in _BOUND:
+                high[where] = _BOUND[name]
+        low = -high
+        for name in ("contacts", "task"):
+            low[self.slices[name]] = 0.0
+        if self.history > 1:
+            for bound in (low, high):
+                bound[self.slices["history"]] = np.tile(bound[:FRAME_SIZE], self.history - 1)
+        return low.astype(np.float32), high.astype(np.float32)
+
+    def flatten(self, parts: Mapping[str, np.ndarray], older_frames: Sequence[np.ndarray], task: int) -> np.ndarray:
+        """The observation, clipped to its bounds as a saturating sensor would.
+
+        Args:
+            parts: the proprioceptive parts and channels by name.
+            older_frames: the `history` - 1 frames before this one, newest first, each of shape (34,).
+            task: index of the task.
+
+        Returns:
+            float32, shape (size,).
+        """
+        observation = np.zeros(self.size)
+        for name, where in self.slices.items():
+            if name in parts:
+                observation[where] = parts[name]
+        if self.history > 1:
+            observation[self.slices["history"]] = np.concatenate(older_frames)
+        observation[self.slices["task"].start + task] = 1.0
+        return np.clip(observation, self.low, self.high).astype(np.float32)

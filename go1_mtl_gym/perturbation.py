@@ -1,0 +1,84 @@
+"""What makes demonstrations worth learning from: noise on actions, kicks, and commands that change."""
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.validation import finite_vector, number_in
+
+NOISE_CORRELATION_S = 0.1
+"""Correlation time of the action noise [s]."""
+
+
+class PerturbationWrapper(gymnasium.Wrapper):
+    """Disturbs a Go1 so that its expert is seen recovering.
+
+    Three disturbances, each drawn from this wrapper's own generator (seeded by ``reset(seed=...)``):
+    first-order autoregressive noise on the executed action, its standard deviation drawn per episode from
+    U(0, `noise_rad`); horizontal kicks of the trunk's velocity, uniform in a disc of radius `kick`, at exponentially
+    distributed times; and commands redrawn from the task's range. `expert_action` is untouched: it answers for the true
+    state, so the labels are clean.
+
+    Args:
+        env: a `Go1Env`, wrapped or not.
+        noise_rad: largest standard deviation of the noise [rad].
+        kick: largest change of velocity [m/s].
+        kick_interval: mean time between kicks [s].
+        command_interval: shortest and longest time between commands [s], or None to leave the command alone.
+
+    Raises:
+        InvalidInputError: if a figure is negative or not finite.
+    """
+
+    def __init__(
+        self,
+        env: gymnasium.Env,
+        noise_rad: float = 0.06,
+        kick: float = 0.2,
+        kick_interval: float = 1.5,
+        command_interval: tuple[float, float] | None = (1.5, 4.0),
+    ) -> None:
+        super().__init__(env)
+        self._noise_rad = number_in(noise_rad, 0.0, 1.0, "noise_rad [rad]")
+        self._kick = number_in(kick, 0.0, 5.0, "kick [m/s]")
+        self._kick_interval = number_in(kick_interval, 0.01, 1e6, "kick_interval [s]")
+        self._command_interval = command_interval
+        if command_interval is not None:
+            low, high = finite_vector(command_interval, 2, "command_interval [s]")
+            if not 0 < low <= high:
+                raise InvalidInputError(f"command_interval must be 0 < shortest <= longest, got {command_interval}")
+        self._rng = np.random.default_rng()
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[np.ndarray, dict]:
+        """Reset the environment; a seed also seeds the disturbances."""
+        if seed is not None:
+            self._rng = np.random.default_rng([seed, 0x9E3779B9])
+        result = self.env.reset(seed=seed, options=options)
+        self._sigma = self._rng.uniform(0.0, self._noise_rad) / self.env.unwrapped.action_map.half_range
+        self._noise = self._sigma * self._rng.standard_normal(12)
+        self._next_kick = self._rng.exponential(self._kick_interval)
+        self._next_command = self._draw_command_time()
+        self._time = 0.0
+        return result
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict]:
+        """Disturb, then step. ``info["executed_action"]`` is the action with its noise."""
+        env = self.env.unwrapped
+        keep = np.exp(-env.control_s / NOISE_CORRELATION_S)
+        self._noise = keep * self._noise + np.sqrt(1 - keep**2) * self._sigma * self._rng.standard_normal(12)
+        self._time += env.control_s
+        if self._time >= self._next_kick:
+            self._next_kick = self._time + self._rng.exponential(self._kick_interval)
+            size, angle = self._kick * np.sqrt(self._rng.uniform()), self._rng.uniform(0.0, 2 * np.pi)
+            env.push([size * np.cos(angle), size * np.sin(angle), 0.0])
+        if self._time >= self._next_command:
+            self._next_command = self._time + self._draw_command_time()
+            env.set_command(env.task.draw_command(self._rng))
+        executed = np.clip(np.asarray(action, dtype=np.float64) + self._noise, -1.0, 1.0).astype(np.float32)
+        observation, reward, terminated, truncated, info = self.env.step(executed)
+        return observation, reward, terminated, truncated, info | {"executed_action": executed}
+
+    def _draw_command_time(self) -> float:
+        return np.inf if self._command_interval is None else self._rng.uniform(*self._command_interval)

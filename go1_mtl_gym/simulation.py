@@ -1,0 +1,130 @@
+"""The robot in MuJoCo: stepping, reading and writing its state. Knows nothing of tasks, gaits or rewards."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from go1_mtl_gym import robot
+from go1_mtl_gym.actuation import PDGains
+
+PHYSICS_HZ = 1000
+CONTACT_FORCE = 2.0
+"""A foot counts as on the ground when it presses with more than this [N]."""
+_STATE = mujoco.mjtState.mjSTATE_INTEGRATION
+_UNSTABLE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What the robot's sensors say at one instant; frames and units as in `go1_mtl_gym.observation`."""
+
+    accelerometer: np.ndarray
+    gyroscope: np.ndarray
+    contacts: np.ndarray
+
+
+class Simulation:
+    """One Go1 on flat ground with PD actuators that run inside MuJoCo at 1 kHz.
+
+    Args:
+        gains: of the PD actuators.
+
+    Attributes:
+        model: the MuJoCo model; private to this simulation, so it may be changed (friction, masses).
+        data: the MuJoCo data.
+    """
+
+    def __init__(self, gains: PDGains) -> None:
+        self.model = mujoco.MjModel.from_xml_path(robot.SCENE_PATH)
+        self.data = mujoco.MjData(self.model)
+        self.model.opt.timestep = 1.0 / PHYSICS_HZ
+        self.model.actuator_gainprm[:, 0] = gains.kp
+        self.model.actuator_biasprm[:, 1] = -gains.kp
+        self.model.actuator_biasprm[:, 2] = -gains.kd
+        self._sensor = {
+            name: slice(start, start + size)
+            for name, start, size in (
+                (self.model.sensor(i).name, self.model.sensor_adr[i], self.model.sensor_dim[i])
+                for i in range(self.model.nsensor)
+            )
+        }
+        self._touch = np.array([self._sensor[f"{leg}_touch"].start for leg in robot.LEGS])
+        self._foot_geom = np.array([self.model.geom(f"{leg}_foot").id for leg in robot.LEGS])
+
+    def reset(self, q: np.ndarray, yaw: float = 0.0) -> None:
+        """Stand still at the world's origin in a joint position, the lowest foot touching the ground.
+
+        Args:
+            q: joint positions [rad], shape (12,); also the actuators' first target.
+            yaw: heading [rad].
+        """
+        mujoco.mj_resetData(self.model, self.data)
+        self.data.qpos[:7] = [0.0, 0.0, robot.STANDING_HEIGHT, np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)]
+        self.data.qpos[7:] = q
+        self.data.ctrl[:] = q
+        mujoco.mj_kinematics(self.model, self.data)
+        self.data.qpos[2] -= self.feet_w[:, 2].min() - robot.FOOT_RADIUS
+        mujoco.mj_forward(self.model, self.data)
+
+    def step(self, target: np.ndarray, physics_steps: int) -> None:
+        """Hold joint targets [rad], shape (12,), for a number of 1 ms steps.
+
+        Sensors, contacts and torques read afterwards belong to the state after the step: `mj_step` leaves those of
+        the state before it, so the forward pass is run once more.
+        """
+        self.data.ctrl[:] = target
+        mujoco.mj_step(self.model, self.data, nstep=physics_steps)
+        mujoco.mj_forward(self.model, self.data)
+
+    def push(self, delta_velocity_w: np.ndarray) -> None:
+        """Add to the trunk's linear velocity [m/s], world frame, shape (3,), at once."""
+        self.data.qvel[:3] += delta_velocity_w
+        mujoco.mj_forward(self.model, self.data)
+
+    @property
+    def q(self) -> np.ndarray:
+        """Joint positions [rad], shape (12,)."""
+        return self.data.qpos[7:].copy()
+
+    @property
+    def v(self) -> np.ndarray:
+        """Joint velocities [rad/s], shape (12,)."""
+        return self.data.qvel[6:].copy()
+
+    @property
+    def torque(self) -> np.ndarray:
+        """Joint torques of the actuators [N m], shape (12,)."""
+        return self.data.actuator_force.copy()
+
+    @property
+    def feet_w(self) -> np.ndarray:
+        """Centres of the feet in the world [m], shape (4, 3)."""
+        return self.data.geom_xpos[self._foot_geom].copy()
+
+    @property
+    def stable(self) -> bool:
+        """False once the physics has diverged (a non-finite or huge position, velocity or acceleration)."""
+        warned = any(self.data.warning[kind].number for kind in _UNSTABLE)
+        return not warned and bool(np.isfinite(self.data.qpos).all() and np.isfinite(self.data.qvel).all())
+
+    def read(self) -> Reading:
+        """The sensors' readings, without noise."""
+        values = self.data.sensordata
+        return Reading(
+            accelerometer=values[self._sensor["accelerometer"]].copy(),
+            gyroscope=values[self._sensor["gyroscope"]].copy(),
+            contacts=values[self._touch] > CONTACT_FORCE,
+        )
+
+    def snapshot(self) -> np.ndarray:
+        """Everything needed to continue to the bit, as one vector."""
+        state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
+        mujoco.mj_getState(self.model, self.data, state, _STATE)
+        return state
+
+    def restore(self, snapshot: np.ndarray) -> None:
+        """Return to a snapshot of a simulation of the same model."""
+        mujoco.mj_setState(self.model, self.data, snapshot, _STATE)
+        mujoco.mj_forward(self.model, self.data)
+        mujoco.mj_setState(self.model, self.data, snapshot, _STATE)

@@ -1,0 +1,76 @@
+"""Everything that an expert may read, as one immutable value."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from go1_mtl_gym.gaits import Gait
+
+
+@dataclass(frozen=True)
+class RobotState:
+    """The robot, its gait clock and its command at one instant.
+
+    An expert's action is a function of this value and of nothing else.
+
+    Attributes:
+        position_w: trunk origin in the world [m], shape (3,); the ground is z = 0.
+        quat_wxyz: attitude of the trunk, unit quaternion (w, x, y, z) from base to world, shape (4,).
+        linear_velocity_w: velocity of the trunk origin, world frame [m/s], shape (3,).
+        angular_velocity_b: angular velocity of the trunk, base frame [rad/s], shape (3,).
+        q: joint positions [rad], shape (12,).
+        v: joint velocities [rad/s], shape (12,).
+        contacts: which feet press on the ground, bool, shape (4,).
+        gait: the contact plan asked for.
+        phase: the gait clock [cycles], in [0, 1).
+        command: filtered (vx [m/s], vy [m/s], yaw rate [rad/s]) in the heading frame, shape (3,).
+    """
+
+    position_w: np.ndarray
+    quat_wxyz: np.ndarray
+    linear_velocity_w: np.ndarray
+    angular_velocity_b: np.ndarray
+    q: np.ndarray
+    v: np.ndarray
+    contacts: np.ndarray
+    gait: Gait
+    phase: float
+    command: np.ndarray
+
+    @property
+    def rotation(self) -> np.ndarray:
+        """Rotation matrix from base to world, shape (3, 3)."""
+        w, x, y, z = self.quat_wxyz
+        return np.array(
+            [
+                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+            ]
+        )
+
+    @property
+    def rpy(self) -> np.ndarray:
+        """Roll, pitch, yaw [rad] of R = Rz(yaw) Ry(pitch) Rx(roll), shape (3,)."""
+        w, x, y, z = self.quat_wxyz
+        return np.array(
+            [
+                np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
+                np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0)),
+                np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
+            ]
+        )
+
+    @property
+    def gravity_b(self) -> np.ndarray:
+        """Unit vector of gravity in the base frame, shape (3,); (0, 0, -1) when level."""
+        return -self.rotation[2]
+
+    @property
+    def base_velocity(self) -> np.ndarray:
+        """Measured (vx, vy [m/s], yaw rate [rad/s]) in the heading frame (world turned by the yaw angle), shape (3,)."""
+        yaw = self.rpy[2]
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        vx, vy, _ = self.linear_velocity_w
+        yaw_rate = self.rotation[2] @ self.angular_velocity_b
+        return np.array([cos * vx + sin * vy, cos * vy - sin * vx, yaw_rate])
