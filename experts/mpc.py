@@ -4,7 +4,7 @@ Variables are the states x[1..N] and the inputs u[0..N-1] of `experts.dynamics`:
 
     minimise    sum_k (x[k] - x_ref[k])' Q (x[k] - x_ref[k]) / 2 + (u[k] - u_ref[k])' R (u[k] - u_ref[k]) / 2
     subject to  x[k+1] = A[k] x[k] + B[k] u[k] + c[k]
-                |f_x| <= mu f_z,  |f_y| <= mu f_z,  0 <= f_z <= f_max s[k]      for each foot,
+                |f_x| <= mu f_z,  |f_y| <= mu f_z,  f_min [s[k] = 1] <= f_z <= f_max s[k]      for each foot,
 
 with s[k] the share of interval k that the foot spends on the ground: feet in the air get exactly no force.
 """
@@ -19,6 +19,8 @@ from experts.dynamics import FORCE_UNIT, LinearModel
 from go1_mtl_gym.validation import number_in
 
 NX = NU = 12
+INEXACT = 1e-2
+"""Largest residual, in the units of the program, with which an unfinished solution is still used."""
 
 
 @dataclass(frozen=True)
@@ -31,28 +33,31 @@ class MPCConfig:
         input_weight: R, per squared unit of `FORCE_UNIT`.
         friction: mu of the pyramid.
         max_force: f_max of one foot [N].
+        min_force: f_min of a foot that stays on the ground throughout an interval [N]; keeps contacts from chattering.
         tolerance: eps_abs and eps_rel of OSQP.
         rho: ADMM step of OSQP; fixed, so that a solution depends on its problem alone.
-        max_iterations: of OSQP; a problem not solved by then is a counted failure.
+        max_iterations: of OSQP; what it has by then is used if its residuals are below `INEXACT`, else the solve failed.
 
     Raises:
         InvalidInputError: if a figure is outside its range.
     """
 
     steps: int = 16
-    state_weight: tuple[float, ...] = (20.0, 20.0, 10.0, 10.0, 10.0, 60.0, 0.4, 0.4, 0.4, 4.0, 4.0, 2.0)
+    state_weight: tuple[float, ...] = (20.0, 20.0, 10.0, 10.0, 10.0, 60.0, 0.4, 0.4, 0.4, 20.0, 20.0, 2.0)
     input_weight: float = 0.2
     friction: float = 0.5
     max_force: float = 160.0
-    tolerance: float = 1e-4
-    rho: float = 0.2
-    max_iterations: int = 1000
+    min_force: float = 10.0
+    tolerance: float = 3e-4
+    rho: float = 2.0
+    max_iterations: int = 500
 
     def __post_init__(self) -> None:
         number_in(self.steps, 4, 64, "steps")
         number_in(self.input_weight, 1e-6, 1e3, "input_weight")
         number_in(self.friction, 0.05, 2.0, "friction")
         number_in(self.max_force, 30.0, 1000.0, "max_force [N]")
+        number_in(self.min_force, 0.0, 30.0, "min_force [N]")
         number_in(self.tolerance, 1e-9, 1e-1, "tolerance")
         number_in(self.rho, 1e-6, 1e6, "rho")
         number_in(self.max_iterations, 10, 1e6, "max_iterations")
@@ -69,7 +74,8 @@ class Solution:
         states: predicted x[1..N], shape (N, 12).
         inputs: u[0..N-1] in units of `FORCE_UNIT`, shape (N, 12).
         iterations: of the solver.
-        solved: False if the solver gave up or returned something that is not finite.
+        solved: the solver met its tolerance.
+        usable: it did, or came close (residuals below `INEXACT`), and everything is finite.
     """
 
     forces_w: np.ndarray
@@ -77,6 +83,7 @@ class Solution:
     inputs: np.ndarray
     iterations: int
     solved: bool
+    usable: bool
 
 
 @dataclass
@@ -152,6 +159,7 @@ class QuadraticProgram:
         offset = model.c.copy()
         offset[0] += model.A[0] @ x0
         self.l[: n * NX] = self.u[: n * NX] = offset.ravel()
+        self.l[n * NX + 4 :: 5] = (contact.ravel() > 1 - 1e-9) * (self.config.min_force / FORCE_UNIT)
         self.u[n * NX + 4 :: 5] = contact.ravel() * (self.config.max_force / FORCE_UNIT)
 
 
@@ -210,11 +218,14 @@ class MPC:
         program.update(model, x0, x_ref, u_ref, contact)
         finite = all(np.isfinite(part).all() for part in (program.q, program.A.data, program.l))
         if not finite:  # OSQP would take it and stay stuck on later, good problems
-            return Solution(np.zeros((4, 3)), x_ref, u_ref, 0, solved=False)
+            return Solution(np.zeros((4, 3)), x_ref, u_ref, 0, solved=False, usable=False)
         self._solver.update(q=program.q, l=program.l, u=program.u, Ax=program.A.data)
         self._solver.warm_start(x=np.concatenate([x_ref.ravel(), u_ref.ravel()]), y=self._multipliers)
         result = self._solver.solve(raise_error=False)
-        solved = result.info.status_val == osqp.SolverStatus.OSQP_SOLVED and bool(np.isfinite(result.x).all())
+        info = result.info
+        finite = bool(np.isfinite(result.x).all())
+        solved = finite and info.status_val == osqp.SolverStatus.OSQP_SOLVED
+        close = finite and max(info.prim_res, info.dual_res) < INEXACT
         states = result.x[: n * NX].reshape(n, NX)
         inputs = result.x[n * NX :].reshape(n, NU)
-        return Solution(inputs[0].reshape(4, 3) * FORCE_UNIT, states, inputs, int(result.info.iter), solved)
+        return Solution(inputs[0].reshape(4, 3) * FORCE_UNIT, states, inputs, int(info.iter), solved, solved or close)

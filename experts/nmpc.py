@@ -12,7 +12,7 @@ Nothing is remembered from call to call but counters and the last good forces fo
 action is a function of the `RobotState`.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -59,12 +59,14 @@ class Counters:
 
     Attributes:
         calls: of `action`.
+        inexact_solves: solves that ran out of iterations close to the optimum and were used.
         solver_failures: solves that gave no usable forces; the last good ones were used.
         bad_states: states that were not finite; the home pose was answered.
         iterations: of the QP solver in all.
     """
 
     calls: int = 0
+    inexact_solves: int = 0
     solver_failures: int = 0
     bad_states: int = 0
     iterations: int = 0
@@ -81,8 +83,9 @@ class NMPCExpert:
         counters: what happened since the last `reset`.
     """
 
-    def __init__(self, gains: PDGains | None = None, config: NMPCConfig | None = None) -> None:
+    def __init__(self, gains: PDGains | None = None, hold_s: float = 0.02, config: NMPCConfig | None = None) -> None:
         self.gains = gains or PDGains()
+        self.hold_s = hold_s
         self.config = config or NMPCConfig()
         self.counters = Counters()
         self._model = RobotModel()
@@ -99,20 +102,22 @@ class NMPCExpert:
     def action(self, state: RobotState) -> np.ndarray:
         """Joint targets for the PD actuators [rad], shape (12,), legs FL FR RL RR; never NaN, never an exception."""
         self.counters.calls += 1
-        torque = self.torque(state)
-        if torque is None:
+        if not _finite(state):
             self.counters.bad_states += 1
             return robot.HOME_POSE.copy()
-        return self.gains.target(torque, state.q, state.v)
+        torque, acceleration = self.torque(state)
+        half = self.hold_s / 2
+        q = state.q + half * state.v + half**2 / 2 * acceleration
+        v = state.v + half * acceleration
+        return self.gains.target(torque, q, v)
 
-    def torque(self, state: RobotState) -> np.ndarray | None:
-        """Joint torques [N m], shape (12,), within the limits; None if the state is not finite."""
-        if not _finite(state):
-            return None
+    def torque(self, state: RobotState) -> tuple[np.ndarray, np.ndarray]:
+        """Joint torques [N m] within the limits and joint accelerations [rad/s^2], each of shape (12,)."""
         dynamics = self._model.dynamics(state)
-        stance = state.gait.stance(state.phase)
         forces = self.forces(state, dynamics)
-        swing = self.config.swing.acceleration(state, dynamics, self.config.footholds)
+        middle = replace(state, phase=state.phase + self.hold_s / 2 / state.gait.period)
+        stance = middle.gait.stance(middle.phase)
+        swing = self.config.swing.acceleration(middle, dynamics, self.config.footholds)
         return joint_torques(dynamics, forces, stance, swing)
 
     def forces(self, state: RobotState, dynamics: Dynamics) -> np.ndarray:
@@ -136,7 +141,8 @@ class NMPCExpert:
         u_ref[:, :, 2] = load / FORCE_UNIT
         solution = self._mpc.solve(model, x0, reference.states[1:], u_ref.reshape(steps, 12), contact)
         self.counters.iterations += solution.iterations
-        if not solution.solved:
+        self.counters.inexact_solves += solution.usable and not solution.solved
+        if not solution.usable:
             self.counters.solver_failures += 1
             return self._last_good_forces
         self._last_good_forces = solution.forces_w

@@ -25,8 +25,8 @@ class SwingRule:
     """
 
     stiffness: float = 400.0
-    damping: float = 35.0
-    press: float = 0.006
+    damping: float = 40.0
+    press: float = 0.003
 
     def acceleration(self, state: RobotState, dynamics: Dynamics, footholds: FootholdRule) -> np.ndarray:
         """Accelerations of all feet as if they were in swing, world [m/s^2], shape (4, 3)."""

@@ -11,7 +11,7 @@ STANCE_DAMPING = 10.0
 
 def joint_torques(
     dynamics: Dynamics, forces_w: np.ndarray, stance: np.ndarray, swing_acceleration_w: np.ndarray
-) -> np.ndarray:
+) -> tuple[np.ndarray, np.ndarray]:
     """Torques that realise forces of the feet on the ground and accelerations of the feet in the air.
 
     With M, h, J of `Dynamics` the accelerations solve one 18 x 18 system, the base's equations of motion above and the
@@ -28,7 +28,8 @@ def joint_torques(
         swing_acceleration_w: world [m/s^2], shape (4, 3); used only where `stance` is False.
 
     Returns:
-        Joint torques [N m], shape (12,), clipped at the torque limits.
+        Joint torques [N m], shape (12,), clipped at the torque limits, and the joint accelerations [rad/s^2], shape (12,),
+        that they were computed for.
     """
     force = np.where(stance[:, None], forces_w, 0.0).ravel()
     foot = np.where(stance[:, None], -STANCE_DAMPING * dynamics.feet_velocity_w, swing_acceleration_w)
@@ -37,4 +38,4 @@ def joint_torques(
     target = np.concatenate([generalised[:6] - dynamics.bias[:6], (foot - dynamics.drift).ravel()])
     acceleration = np.linalg.solve(system, target)
     torque = (dynamics.mass_matrix @ acceleration + dynamics.bias - generalised)[6:]
-    return np.clip(torque, -robot.TORQUE_LIMIT, robot.TORQUE_LIMIT)
+    return np.clip(torque, -robot.TORQUE_LIMIT, robot.TORQUE_LIMIT), acceleration[6:]

@@ -1,0 +1,54 @@
+# make dagger       installs into .venv, then runs the main job      make dagger ARGS="--preset smoke"
+# make test         installs into .venv, then lints and tests        make test PYTEST_ARGS="tests/env -x"
+# make test-newest  the same tests on the newest gymnasium and stable-baselines3, in .venv-newest
+# make clean        removes both environments and everything built
+#
+# Another interpreter: make test PYTHON=python3.12 (after make clean).
+# On Linux the default package index serves PyTorch with CUDA, several GB. Without a GPU, point pip at PyTorch's CPU
+# index yourself (environment variable PIP_EXTRA_INDEX_URL, or pip.conf); torch==2.13.0+cpu satisfies the constraints.
+
+PYTHON ?= python3
+ARGS ?=
+PYTEST_ARGS ?= -n 2 --dist worksteal
+
+PIP = bin/python -m pip --disable-pip-version-check install -q
+TESTED = -c constraints/tested.txt
+SOURCES = pyproject.toml constraints/tested.txt
+
+# The tests' processes run side by side, one thread each.
+test test-newest: export OMP_NUM_THREADS = 1
+test test-newest: export OPENBLAS_NUM_THREADS = 1
+test test-newest: export MKL_NUM_THREADS = 1
+
+.PHONY: dagger test test-newest clean
+
+dagger: .venv/.installed
+	.venv/bin/python examples/dagger.py $(ARGS)
+
+test: .venv/.installed-test
+	.venv/bin/ruff check .
+	.venv/bin/python -m pytest $(PYTEST_ARGS)
+
+test-newest: .venv-newest/.installed-test
+	.venv-newest/bin/python -m pytest $(PYTEST_ARGS)
+
+.venv/.installed: $(SOURCES)
+	$(PYTHON) -m venv .venv
+	.venv/$(PIP) $(TESTED) -e .
+	touch $@
+
+.venv/.installed-test: $(SOURCES)
+	$(PYTHON) -m venv .venv
+	.venv/$(PIP) $(TESTED) -e ".[test]"
+	touch .venv/.installed $@
+
+# imitation pins older versions of both; the code runs on the newest all the same, so they go on top without its consent.
+.venv-newest/.installed-test: $(SOURCES) constraints/newest.txt
+	$(PYTHON) -m venv .venv-newest
+	.venv-newest/$(PIP) $(TESTED) -e ".[test]"
+	.venv-newest/$(PIP) --no-deps -r constraints/newest.txt
+	touch $@
+
+clean:
+	rm -rf .venv .venv-newest build dist *.egg-info .pytest_cache .ruff_cache
+	find go1_mtl_gym experts trainers examples tests -name __pycache__ -prune -exec rm -rf {} +

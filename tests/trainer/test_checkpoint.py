@@ -1,0 +1,103 @@
+"""Policies on disk."""
+
+import json
+import zipfile
+
+import numpy as np
+import pytest
+import torch
+
+import trainers
+from go1_mtl_gym.errors import Go1Error, InvalidInputError
+from tests.trainer.stub_env import StubEnv
+from tests.trainer.test_policy import observations
+from trainers import MultiHeadPolicy
+
+
+@pytest.fixture
+def saved(policy, tmp_path):
+    """A policy with fitted normalisation, and the file it was saved to."""
+    policy.fit_normalization(observations([0, 1, 2, 3] * 20), np.random.default_rng(0).uniform(-1, 1, (80, 12)))
+    policy.env_kwargs = {"tasks": ("trot", "bound"), "channels": ("command",), "history": 1, "kp": 50.0}
+    path = tmp_path / "deep" / "policy.zip"
+    policy.save(path)
+    return policy, path
+
+
+@pytest.mark.parametrize("load", [trainers.load, MultiHeadPolicy.load])
+def test_round_trip_is_exact(saved, load):
+    policy, path = saved
+    other = load(path)
+    obs = observations([0, 3, 1, 2])
+    np.testing.assert_array_equal(other.predict(obs, deterministic=True)[0], policy.predict(obs, deterministic=True)[0])
+    assert other.state_dict().keys() == policy.state_dict().keys()
+    assert all(torch.equal(a, b) for a, b in zip(other.state_dict().values(), policy.state_dict().values()))
+    assert other.env_kwargs == policy.env_kwargs
+    assert other.observation_space == policy.observation_space and other.action_space == policy.action_space
+    assert not other.training
+
+
+def test_kwargs_and_infinite_bounds_survive(tmp_path):
+    env = StubEnv()
+    space = type(env.observation_space)(-np.inf, np.inf, env.observation_space.shape, np.float32)
+    policy = MultiHeadPolicy(space, env.action_space, width=8, pooled=True, normalization="min_max", clip_sd=4.0)
+    policy.save(tmp_path / "p.zip")
+    other = trainers.load(tmp_path / "p.zip")
+    assert other.network_kwargs() == policy.network_kwargs()
+    assert other.observation_space == space
+
+
+def test_file_is_json_and_safetensors(saved):
+    with zipfile.ZipFile(saved[1]) as archive:
+        assert sorted(archive.namelist()) == ["policy.json", "weights.safetensors"]
+        description = json.loads(archive.read("policy.json"))
+    assert description["versions"]["torch"] and description["network"]["width"] == 32
+
+
+def test_failed_save_leaves_the_old_file(saved, monkeypatch):
+    policy, path = saved
+    before = path.read_bytes()
+    monkeypatch.setattr("safetensors.torch.save", lambda weights: (_ for _ in ()).throw(OSError("disk full")))
+    with pytest.raises(OSError, match="disk full"):
+        policy.save(path)
+    assert path.read_bytes() == before
+    assert [p.name for p in path.parent.iterdir()] == ["policy.zip"]
+
+
+def test_env_kwargs_must_be_json(saved):
+    policy, path = saved
+    policy.env_kwargs = {"tasks": object()}
+    with pytest.raises(InvalidInputError, match="JSON"):
+        policy.save(path)
+
+
+def test_missing_truncated_and_foreign_files(saved, tmp_path):
+    _, path = saved
+    whole = path.read_bytes()
+    (tmp_path / "half.zip").write_bytes(whole[: len(whole) // 2])
+    (tmp_path / "text.zip").write_text("not a zip")
+    flipped = bytearray(whole)
+    flipped[len(whole) // 2] ^= 0xFF
+    (tmp_path / "flipped.zip").write_bytes(flipped)
+    with zipfile.ZipFile(tmp_path / "foreign.zip", "w") as archive:
+        archive.writestr("data", "{}")
+    for name in ("absent.zip", "half.zip", "text.zip", "flipped.zip", "foreign.zip"):
+        with pytest.raises(trainers.CheckpointError, match=name) as caught:
+            trainers.load(tmp_path / name)
+        assert isinstance(caught.value, Go1Error)
+
+
+@pytest.mark.parametrize(
+    "change", [{"format": "x"}, {"format_version": 99}, {"network": {"width": 31}}, {"network": {"rm": 1}}]
+)
+def test_inconsistent_description(saved, tmp_path, change):
+    with zipfile.ZipFile(saved[1]) as archive:
+        description = json.loads(archive.read("policy.json"))
+        weights = archive.read("weights.safetensors")
+    for name, value in change.items():
+        description[name] = {**description[name], **value} if isinstance(value, dict) else value
+    with zipfile.ZipFile(tmp_path / "p.zip", "w") as archive:
+        archive.writestr("policy.json", json.dumps(description))
+        archive.writestr("weights.safetensors", weights)
+    with pytest.raises(trainers.CheckpointError):
+        trainers.load(tmp_path / "p.zip")

@@ -1,0 +1,104 @@
+"""Imitation of a Go1 expert: demonstrations, a multi-head policy, behaviour cloning, DAgger and closed-loop evaluation.
+
+The package knows environments only by "a Gymnasium environment with a method ``expert_action``"; it never imports an
+expert. Names are resolved on first use, so that a worker that only collects demonstrations does not load torch.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from trainers.batches import TensorBatches
+    from trainers.bc import BCConfig, BCHistory, BCTrainer, train_bc
+    from trainers.checkpoint import CheckpointError, load
+    from trainers.collection import CollectJob, ShardMismatchError, collect, collect_all
+    from trainers.collector import BlockCollector
+    from trainers.dagger import DAggerConfig, DAggerTrainer
+    from trainers.dataset import Demonstrations
+    from trainers.environments import PerturbationConfig, make_env, make_venv
+    from trainers.evaluation import ClosedLoopResult, EpisodeRecord, evaluate
+    from trainers.expert_policy import ExpertPolicy
+    from trainers.figures import joint_target_figure
+    from trainers.losses import MultiTaskLoss
+    from trainers.metrics import offline_metrics
+    from trainers.policy import MultiHeadPolicy
+    from trainers.tensorboard import log_figure, log_round, log_text, make_logger
+
+_HOME = {
+    "BCConfig": "bc",
+    "BCHistory": "bc",
+    "BCTrainer": "bc",
+    "BlockCollector": "collector",
+    "CheckpointError": "checkpoint",
+    "ClosedLoopResult": "evaluation",
+    "CollectJob": "collection",
+    "DAggerConfig": "dagger",
+    "DAggerTrainer": "dagger",
+    "Demonstrations": "dataset",
+    "EpisodeRecord": "evaluation",
+    "ExpertPolicy": "expert_policy",
+    "MultiHeadPolicy": "policy",
+    "MultiTaskLoss": "losses",
+    "PerturbationConfig": "environments",
+    "ShardMismatchError": "collection",
+    "TensorBatches": "batches",
+    "collect": "collection",
+    "collect_all": "collection",
+    "evaluate": "evaluation",
+    "joint_target_figure": "figures",
+    "load": "checkpoint",
+    "log_figure": "tensorboard",
+    "log_round": "tensorboard",
+    "log_text": "tensorboard",
+    "make_env": "environments",
+    "make_logger": "tensorboard",
+    "make_venv": "environments",
+    "offline_metrics": "metrics",
+    "train_bc": "bc",
+}
+
+__all__ = [
+    "BCConfig",
+    "BCHistory",
+    "BCTrainer",
+    "BlockCollector",
+    "CheckpointError",
+    "ClosedLoopResult",
+    "CollectJob",
+    "DAggerConfig",
+    "DAggerTrainer",
+    "Demonstrations",
+    "EpisodeRecord",
+    "ExpertPolicy",
+    "MultiHeadPolicy",
+    "MultiTaskLoss",
+    "PerturbationConfig",
+    "ShardMismatchError",
+    "TensorBatches",
+    "collect",
+    "collect_all",
+    "evaluate",
+    "joint_target_figure",
+    "load",
+    "log_figure",
+    "log_round",
+    "log_text",
+    "make_env",
+    "make_logger",
+    "make_venv",
+    "offline_metrics",
+    "train_bc",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name from the file that holds it."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'trainers' has no attribute {name!r}; it has {', '.join(__all__)}")
+    value = getattr(import_module(f"trainers.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(set(globals()) | set(__all__))

@@ -1,0 +1,136 @@
+"""Policies on disk: one zip of ``policy.json`` and ``weights.safetensors``; reading it executes no code."""
+
+import json
+import math
+import zipfile
+from importlib.metadata import PackageNotFoundError, version
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+import numpy as np
+import safetensors.torch
+import torch
+from gymnasium.spaces import Box
+
+from go1_mtl_gym.errors import InvalidInputError
+from trainers.files import write_atomically
+
+if TYPE_CHECKING:
+    from trainers.policy import MultiHeadPolicy
+
+FORMAT = "go1-mtl-gym policy"
+FORMAT_VERSION = 1
+PACKAGES = ("go1-mtl-gym", "numpy", "torch", "gymnasium", "stable-baselines3", "imitation", "mujoco")
+
+
+class CheckpointError(InvalidInputError):
+    """A file is not a policy that this version can read."""
+
+
+def save(policy: "MultiHeadPolicy", path: str | PathLike[str]) -> None:
+    """Write a policy; whoever reads `path` meanwhile sees the old file or the new one, never a part.
+
+    Raises:
+        InvalidInputError: if `env_kwargs` hold something that JSON cannot.
+    """
+    description = {
+        "format": FORMAT,
+        "format_version": FORMAT_VERSION,
+        "network": policy.network_kwargs(),
+        "observation_space": _space_to_json(policy.observation_space),
+        "action_space": _space_to_json(policy.action_space),
+        "versions": versions(),
+    }
+    try:
+        text = json.dumps(description, indent=1, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise InvalidInputError(f"env_kwargs must be JSON values to be saved, got {policy.env_kwargs!r}") from error
+    weights = {name: value.detach().cpu().contiguous() for name, value in policy.state_dict().items()}
+
+    def write(file: BinaryIO) -> None:
+        with zipfile.ZipFile(file, "w") as archive:
+            archive.writestr("policy.json", text)
+            archive.writestr("weights.safetensors", safetensors.torch.save(weights))
+
+    write_atomically(path, write)
+
+
+def load(path: str | PathLike[str], device: torch.device | str = "cpu") -> "MultiHeadPolicy":
+    """Read a policy that `MultiHeadPolicy.save` wrote, in evaluation mode.
+
+    Args:
+        path: the zip file.
+        device: where its tensors go.
+
+    Raises:
+        CheckpointError: if the file is missing, damaged, or something else.
+    """
+    from trainers.policy import MultiHeadPolicy
+
+    description, weights = _read(Path(path))
+    try:
+        network = {name: _tuples(value) for name, value in description["network"].items()}
+        spaces = [_space_from_json(description[name]) for name in ("observation_space", "action_space")]
+        policy = MultiHeadPolicy(*spaces, seed=0, **network)
+        policy.seed = None
+        policy.load_state_dict(weights)
+    except (KeyError, TypeError, ValueError, RuntimeError) as error:
+        raise CheckpointError(f"{path} does not hold a consistent policy: {error}") from error
+    policy.to(torch.device(device))
+    policy.set_training_mode(False)
+    return policy
+
+
+def versions() -> dict[str, str]:
+    """Installed versions of the packages that shape a result."""
+    found = {}
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return found
+
+
+def _read(path: Path) -> tuple[dict[str, Any], dict[str, torch.Tensor]]:
+    if not path.is_file():
+        raise CheckpointError(f"no policy at {path}: there is no such file")
+    try:
+        with zipfile.ZipFile(path) as archive:
+            if "policy.json" not in archive.namelist():
+                raise CheckpointError(
+                    f"{path} was not written by MultiHeadPolicy.save: there is no policy.json in it (PPO.load "
+                    "reads what PPO.save wrote)"
+                )
+            description = json.loads(archive.read("policy.json"))
+            weights = safetensors.torch.load(archive.read("weights.safetensors"))
+    except CheckpointError:
+        raise
+    except Exception as error:  # zip, JSON and safetensors each raise their own on damage
+        raise CheckpointError(f"{path} is damaged or no policy file: {error}") from error
+    if not isinstance(description, dict) or description.get("format") != FORMAT:
+        raise CheckpointError(f"{path} is not a {FORMAT!r} file")
+    if description.get("format_version") != FORMAT_VERSION:
+        got = description.get("format_version")
+        raise CheckpointError(f"{path} has format version {got!r}; this package reads {FORMAT_VERSION}")
+    return description, weights
+
+
+def _space_to_json(space: Box) -> dict[str, Any]:
+    def numbers(bound: np.ndarray) -> list[float | str]:
+        return [value if math.isfinite(value) else repr(value) for value in bound.astype(np.float64).tolist()]
+
+    return {"low": numbers(space.low), "high": numbers(space.high), "dtype": str(space.dtype)}
+
+
+def _space_from_json(space: dict[str, Any]) -> Box:
+    low, high = (np.array([float(value) for value in space[name]], dtype=space["dtype"]) for name in ("low", "high"))
+    return Box(low, high, dtype=np.dtype(space["dtype"]).type)
+
+
+def _tuples(value: Any) -> Any:
+    """JSON lists back to tuples, at any depth."""
+    if isinstance(value, dict):
+        return {name: _tuples(item) for name, item in value.items()}
+    return tuple(_tuples(item) for item in value) if isinstance(value, list) else value

@@ -1,0 +1,111 @@
+"""Making the environments that the trainers step: one place for ids, keyword arguments, disturbances and seeds."""
+
+import dataclasses
+import zlib
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+import go1_mtl_gym
+from go1_mtl_gym.errors import InvalidInputError
+
+EnvFactory = Callable[..., gymnasium.Env]
+"""What `make_env` is: (task, perturbation=None, **env_kwargs) -> environment with a method ``expert_action``."""
+
+
+@dataclasses.dataclass(frozen=True)
+class PerturbationConfig:
+    """How demonstrations are disturbed; see `go1_mtl_gym.PerturbationWrapper`.
+
+    Attributes:
+        noise_rad: largest standard deviation of the noise on the executed action [rad].
+        kick: largest velocity kick [m/s].
+        kick_interval: mean time between kicks [s].
+        command_interval: shortest and longest time between new commands [s], or None for one command per episode.
+
+    Raises:
+        InvalidInputError: if a figure is negative, or the interval is not 0 < shortest <= longest.
+    """
+
+    noise_rad: float = 0.06
+    kick: float = 0.2
+    kick_interval: float = 1.5
+    command_interval: tuple[float, float] | None = (1.5, 4.0)
+
+    def __post_init__(self) -> None:
+        if not (self.noise_rad >= 0 and self.kick >= 0 and self.kick_interval > 0):
+            raise InvalidInputError(f"noise_rad and kick must be >= 0 and kick_interval > 0, got {self}")
+        if self.command_interval is not None:
+            object.__setattr__(self, "command_interval", tuple(self.command_interval))
+            if len(self.command_interval) != 2 or not 0 < self.command_interval[0] <= self.command_interval[1]:
+                raise InvalidInputError(f"command_interval must be 0 < shortest <= longest, got {self}")
+
+
+class ExpertAccess(gymnasium.Wrapper):
+    """Carries `expert_action` outward, so that ``venv.env_method("expert_action")`` finds it on every gymnasium."""
+
+    def expert_action(self) -> np.ndarray:
+        """The expert's action at the present state, shape (12,)."""
+        return self.env.unwrapped.expert_action()
+
+
+def make_env(task: str | None, perturbation: PerturbationConfig | None = None, **env_kwargs: Any) -> gymnasium.Env:
+    """One environment.
+
+    Args:
+        task: name of a task; None for the multi-gait environment.
+        perturbation: disturbances of the executed action, or None.
+        env_kwargs: of `go1_mtl_gym.Go1Env`.
+    """
+    env = gymnasium.make(go1_mtl_gym.env_id(task), disable_env_checker=True, **env_kwargs)
+    if perturbation is not None:
+        env = go1_mtl_gym.PerturbationWrapper(env, **dataclasses.asdict(perturbation))
+    return ExpertAccess(env)
+
+
+def make_venv(
+    tasks: Sequence[str],
+    per_task: int = 1,
+    env_kwargs: Mapping[str, Any] | None = None,
+    perturbation: PerturbationConfig | None = None,
+    subproc: bool = False,
+    make_env: EnvFactory = make_env,
+) -> Any:
+    """A stable-baselines3 vector environment with `per_task` environments of every task, in the order of `tasks`.
+
+    Args:
+        tasks: which tasks to make environments of.
+        per_task: how many of each.
+        env_kwargs: of `make_env`.
+        perturbation: of `make_env`.
+        subproc: one process per environment instead of one for all.
+        make_env: another factory, for tests and other robots.
+    """
+    from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv
+
+    if per_task < 1:
+        raise InvalidInputError(f"per_task must be at least 1, got {per_task}")
+    kwargs = dict(env_kwargs or {})
+    thunks = [_Thunk(make_env, task, perturbation, kwargs) for task in tasks for _ in range(per_task)]
+    return SubprocVecEnv(thunks, start_method="spawn") if subproc else DummyVecEnv(thunks)
+
+
+@dataclasses.dataclass(frozen=True)
+class _Thunk:
+    """A picklable call of an environment factory."""
+
+    make: EnvFactory
+    task: str
+    perturbation: PerturbationConfig | None
+    env_kwargs: dict[str, Any]
+
+    def __call__(self) -> gymnasium.Env:
+        return self.make(self.task, self.perturbation, **self.env_kwargs)
+
+
+def derive_seed(*keys: int | str) -> int:
+    """A seed in [0, 2^31) that depends on every key, and not on the process or machine."""
+    words = [zlib.crc32(key.encode()) if isinstance(key, str) else int(key) for key in keys]
+    return int(np.random.SeedSequence(words).generate_state(1)[0] >> 1)

@@ -1,0 +1,76 @@
+"""The actor's network: one trunk, one head per task, and the routing of each row to its own head."""
+
+from collections.abc import Sequence
+
+import torch
+from torch import nn
+
+OUTPUT_GAIN = 0.01
+"""Initial output weights are this much smaller than torch's: an untrained policy stays near the mean action."""
+
+
+class MultiHeadActor(nn.Module):
+    """Shared trunk of two hidden layers; per task one hidden layer and one output layer; ELU (arXiv 2505.08574).
+
+    With one head this is the plain network of the same depth.
+
+    Args:
+        n_inputs: columns of the input.
+        n_outputs: columns of the output.
+        n_heads: number of heads.
+        width: units of every hidden layer.
+    """
+
+    def __init__(self, n_inputs: int, n_outputs: int, n_heads: int, width: int) -> None:
+        super().__init__()
+        self.trunk = nn.Sequential(nn.Linear(n_inputs, width), nn.ELU(), nn.Linear(width, width), nn.ELU())
+        self.heads = nn.ModuleList(
+            nn.Sequential(nn.Linear(width, width), nn.ELU(), nn.Linear(width, n_outputs)) for _ in range(n_heads)
+        )
+        with torch.no_grad():
+            for head in self.heads:
+                head[-1].weight.mul_(OUTPUT_GAIN)
+                head[-1].bias.zero_()
+
+    def forward(self, x: torch.Tensor, head: torch.Tensor) -> torch.Tensor:
+        """Outputs of shape (n, n_outputs) for inputs of shape (n, n_inputs) and head indices of shape (n,)."""
+        return route(self.heads, self.trunk(x), head)
+
+
+def route(heads: Sequence[nn.Module], features: torch.Tensor, head: torch.Tensor) -> torch.Tensor:
+    """Apply to each row the head it names.
+
+    Rows are grouped by head, so each head computes its own rows only and receives gradients from these alone. Rows that
+    come sorted by head are not moved.
+
+    Args:
+        heads: modules with equal output size.
+        features: shape (n, width).
+        head: int64 indices, shape (n,).
+
+    Returns:
+        shape (n, outputs), in the order of the input rows.
+    """
+    if len(heads) == 1 or len(features) == 0:
+        return heads[0](features)
+    if len(features) == 1:
+        return heads[int(head)](features)
+    counts = torch.bincount(head, minlength=len(heads)).tolist()
+    if max(counts) == len(features):
+        return heads[counts.index(len(features))](features)
+    if bool((head[1:] >= head[:-1]).all()):
+        return _by_group(heads, features, counts)
+    order = torch.argsort(head, stable=True)
+    back = torch.empty_like(order)
+    back[order] = torch.arange(len(order), device=order.device)
+    return _by_group(heads, features[order], counts)[back]
+
+
+def _by_group(heads: Sequence[nn.Module], features: torch.Tensor, counts: list[int]) -> torch.Tensor:
+    groups = zip(heads, features.split(counts))
+    return torch.cat([head(rows) for head, rows in groups if len(rows)])
+
+
+def critic(n_inputs: int, width: int = 64) -> nn.Sequential:
+    """A small value network (two hidden layers); behaviour cloning never evaluates it."""
+    return nn.Sequential(nn.Linear(n_inputs, width), nn.ELU(), nn.Linear(width, width), nn.ELU(), nn.Linear(width, 1))
