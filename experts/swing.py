@@ -22,17 +22,21 @@ class SwingRule:
         stiffness: [1/s^2].
         damping: [1/s].
         press: how far below the ground the touchdown is aimed, so that contact is certain [m].
+        early: share of the swing at whose end the foot is down already and waits, so that it is not thrown at the ground
+            when its stance begins.
     """
 
     stiffness: float = 400.0
     damping: float = 40.0
     press: float = 0.003
+    early: float = 0.1
 
     def acceleration(self, state: RobotState, dynamics: Dynamics, footholds: FootholdRule) -> np.ndarray:
         """Accelerations of all feet as if they were in swing, world [m/s^2], shape (4, 3)."""
         gait = state.gait
-        s = gait.swing_progress(state.phase)
-        remaining = (1.0 - s) * gait.swing_s
+        progress = gait.swing_progress(state.phase)
+        remaining = (1.0 - progress) * gait.swing_s
+        s = np.minimum(progress / (1.0 - self.early), 1.0)
         landing = footholds.plan(state, dynamics.com_w, dynamics.com_velocity_w, remaining)
         yaw_rate = state.command[2]
         body_velocity = dynamics.com_velocity_w[:2]
@@ -42,7 +46,7 @@ class SwingRule:
 
         left, rate, curvature = _quintic(s)
         height, climb, bend = _hump(s)
-        time = gait.swing_s
+        time = gait.swing_s * (1.0 - self.early)
         position = landing.copy()
         position[:, :2] -= left[:, None] * stride
         position[:, 2] = robot.FOOT_RADIUS + gait.swing_height * height - self.press * s**2
@@ -52,6 +56,8 @@ class SwingRule:
         forward = np.zeros((4, 3))
         forward[:, :2] = -curvature[:, None] * stride / time**2
         forward[:, 2] = (gait.swing_height * bend - 2 * self.press) / time**2
+        down = progress >= 1.0 - self.early
+        velocity[down, 2], forward[down] = 0.0, 0.0
         return (
             forward
             + self.stiffness * (position - dynamics.feet_w)

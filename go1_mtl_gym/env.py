@@ -333,7 +333,8 @@ class Go1Env(gymnasium.Env):
         }
         if self._noise is not None:
             self._noise.apply(parts, self.np_random)
-        parts = {name: np.nan_to_num(part) for name, part in parts.items()}
+        if not self._simulation.stable:
+            parts = {name: np.nan_to_num(part) for name, part in parts.items()}
         frame = np.concatenate([parts[name] for name in PROPRIOCEPTION])
         if self._steps == 0:
             self._frames.extend([frame] * self._frames.maxlen)

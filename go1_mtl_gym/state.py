@@ -1,6 +1,7 @@
 """Everything that an expert may read, as one immutable value."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -37,7 +38,7 @@ class RobotState:
     phase: float
     command: np.ndarray
 
-    @property
+    @cached_property
     def rotation(self) -> np.ndarray:
         """Rotation matrix from base to world, shape (3, 3)."""
         w, x, y, z = self.quat_wxyz
@@ -49,7 +50,7 @@ class RobotState:
             ]
         )
 
-    @property
+    @cached_property
     def rpy(self) -> np.ndarray:
         """Roll, pitch, yaw [rad] of R = Rz(yaw) Ry(pitch) Rx(roll), shape (3,)."""
         w, x, y, z = self.quat_wxyz

@@ -171,7 +171,7 @@ class BCTrainer(imitation_bc.BC):
 
     def _record(self, validation: Demonstrations | None) -> float:
         """Write the last batch's losses and the held-out R2 to history and log; return the loss."""
-        last = {name: float(value) for name, value in vars(self._bc_logger.metrics).items()}
+        last = {name: float(value.detach()) for name, value in vars(self._bc_logger.metrics).items()}
         history = self.history
         if not np.isfinite(last["loss"]):
             raise TrainingDivergedError(f"the loss is {last['loss']} after {self.steps_done} steps")

@@ -20,9 +20,10 @@ class BlockCollector(InteractiveTrajectoryCollector):
     """`imitation`'s collector with blocks of control instead of a coin per step, and with row budgets.
 
     Each environment is driven in blocks of random duration; a block belongs to the expert with probability `beta`, else
-    to the learner, so that states are seen that only come of following the learner for a while. ``step(expert_actions)``
-    records the expert's actions as labels whoever drives. An environment that has its rows is no longer recorded (it is
-    stepped with the expert's actions until all have theirs). The last 0.24 s before a fall are dropped.
+    to the learner, so that states are seen that only come of following the learner for a while.
+    ``step(expert_actions)`` records the expert's actions as labels whoever drives. An environment that has its rows is
+    no longer recorded (it is stepped with the expert's actions until all have theirs). The last 0.24 s before a fall
+    are dropped.
 
     Args:
         venv: environments of any tasks.

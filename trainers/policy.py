@@ -189,6 +189,11 @@ class MultiHeadPolicy(ActorCriticPolicy):
         """Values, shape (n, 1)."""
         return self._values(self._normalised(obs), obs)
 
+    def set_training_mode(self, mode: bool) -> None:
+        """Switch between training and evaluation; `predict` asks for it each time, and walking all modules is slow."""
+        if mode != self.training:
+            super().set_training_mode(mode)
+
     def _predict(self, observation: torch.Tensor, deterministic: bool = False) -> torch.Tensor:
         means = self.mean_actions(observation)
         return means if deterministic else self._gaussian(means).get_actions()

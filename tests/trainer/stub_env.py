@@ -1,7 +1,7 @@
 """A Go1 without physics: same names and spaces as `Go1Env`, an expert that is linear in the observation.
 
-The action's meaning is made up so that tests can script behaviour: hips 0, 3, 6 set the base velocity (vx, vy, yaw rate),
-a thigh above 0.5 lifts its leg, the first knee above 0.95 makes the robot fall. Joints follow targets with a lag.
+The action's meaning is made up so that tests can script behaviour: hips 0, 3, 6 set the base velocity (vx, vy, yaw
+rate), a thigh above 0.5 lifts its leg, the first knee above 0.95 makes the robot fall. Joints lag behind.
 """
 
 from dataclasses import dataclass

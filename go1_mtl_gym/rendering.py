@@ -1,0 +1,129 @@
+"""Pictures of the robot, with its foot contacts and its command drawn in: off screen or in a window."""
+
+from typing import Protocol
+
+import mujoco
+import numpy as np
+
+from go1_mtl_gym.errors import Go1Error
+from go1_mtl_gym.robot import FOOT_RADIUS
+from go1_mtl_gym.simulation import Simulation
+from go1_mtl_gym.state import RobotState
+
+CAMERA = "track"
+COMMAND_COLOUR = (0.15, 0.75, 0.30, 0.9)
+VELOCITY_COLOUR = (0.20, 0.45, 0.95, 0.9)
+CONTACT_COLOUR = (0.98, 0.55, 0.10, 0.8)
+ARROW_S = 0.6
+"""Length of an arrow per speed [m per m/s]."""
+
+
+class RenderingError(Go1Error, RuntimeError):
+    """No picture can be drawn on this machine."""
+
+
+class Drawing(Protocol):
+    """What the environment asks of a renderer."""
+
+    def draw(self, state: RobotState) -> np.ndarray | None:
+        """Draw the present state."""
+
+    def close(self) -> None:
+        """Free the resources."""
+
+
+def annotate(scene: mujoco.MjvScene, simulation: Simulation, state: RobotState) -> None:
+    """Add to a scene: a disc under each foot on the ground, the command (green) and the velocity (blue) as arrows."""
+    for foot, contact in zip(simulation.feet_w, state.contacts, strict=True):
+        if contact:
+            size = [2.2 * FOOT_RADIUS, 2.2 * FOOT_RADIUS, 0.002]
+            _add(scene, mujoco.mjtGeom.mjGEOM_ELLIPSOID, size, [*foot[:2], 0.003], CONTACT_COLOUR)
+    yaw = state.rpy[2]
+    turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
+    above = state.position_w + [0.0, 0.0, 0.22]
+    for velocity, colour, lift in (
+        (state.command, COMMAND_COLOUR, 0.03),
+        (state.base_velocity, VELOCITY_COLOUR, 0.0),
+    ):
+        tip = above + np.append(turn @ velocity[:2] * ARROW_S, lift)
+        start = above + [0.0, 0.0, lift]
+        if np.linalg.norm(tip - start) > 0.02:
+            geom = _add(scene, mujoco.mjtGeom.mjGEOM_ARROW, np.zeros(3), np.zeros(3), colour)
+            if geom is not None:
+                mujoco.mjv_connector(geom, mujoco.mjtGeom.mjGEOM_ARROW, 0.012, start, tip)
+
+
+def _add(scene: mujoco.MjvScene, kind: int, size: list, position: list, colour: tuple) -> mujoco.MjvGeom | None:
+    if scene.ngeom >= scene.maxgeom:
+        return None
+    geom = scene.geoms[scene.ngeom]
+    scene.ngeom += 1
+    mujoco.mjv_initGeom(geom, kind, np.array(size), np.array(position), np.eye(3).ravel(), np.array(colour, np.float32))
+    return geom
+
+
+class Camera:
+    """Off-screen pictures from the tracking camera.
+
+    Args:
+        simulation: what to look at.
+        width, height: of the picture [pixels].
+
+    Raises:
+        RenderingError: if no OpenGL context can be had.
+    """
+
+    def __init__(self, simulation: Simulation, width: int, height: int) -> None:
+        self._simulation = simulation
+        try:
+            self._renderer = mujoco.Renderer(simulation.model, height, width)
+        except Exception as error:  # the type differs from one OpenGL backend to the next
+            raise RenderingError(
+                f"cannot draw off screen: {error}; try the environment variable MUJOCO_GL=egl (or osmesa)"
+            ) from error
+
+    def draw(self, state: RobotState) -> np.ndarray:
+        """RGB array, uint8, shape (height, width, 3)."""
+        self._renderer.update_scene(self._simulation.data, camera=CAMERA)
+        annotate(self._renderer.scene, self._simulation, state)
+        return self._renderer.render()
+
+    def close(self) -> None:
+        """Free the OpenGL context."""
+        self._renderer.close()
+
+
+class Viewer:
+    """An interactive window.
+
+    Args:
+        simulation: what to look at.
+        width, height: not used; the window can be resized.
+
+    Raises:
+        RenderingError: if no window can be opened.
+    """
+
+    def __init__(self, simulation: Simulation, width: int, height: int) -> None:
+        import mujoco.viewer
+
+        self._simulation = simulation
+        try:
+            self._window = mujoco.viewer.launch_passive(
+                simulation.model, simulation.data, show_left_ui=False, show_right_ui=False
+            )
+        except Exception as error:  # GLFW and MuJoCo raise different types
+            raise RenderingError(f'cannot open a window: {error}; use render_mode="rgb_array"') from error
+        self._window.cam.type = mujoco.mjtCamera.mjCAMERA_FIXED
+        self._window.cam.fixedcamid = simulation.model.camera(CAMERA).id
+
+    def draw(self, state: RobotState) -> None:
+        """Show the present state."""
+        with self._window.lock():
+            self._window.user_scn.ngeom = 0
+            annotate(self._window.user_scn, self._simulation, state)
+        self._window.sync()
+
+    def close(self) -> None:
+        """Close the window."""
+        self._window.close()

@@ -1,0 +1,131 @@
+"""Gait clocks worked by hand, and the contact schedule against a fine numerical integral."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.gaits import GAITS, Gait
+
+EVERY = pytest.mark.parametrize("gait", GAITS.values(), ids=str)
+
+
+def touchdown_phases(gait: Gait) -> np.ndarray:
+    """Phases at which each leg begins its stance, found on a fine grid, shape (4,)."""
+    grid = np.arange(10000) / 10000
+    stance = gait.stance(grid)
+    began = stance & ~np.roll(stance, 1, axis=0)
+    assert (began.sum(axis=0) == 1).all()
+    return grid[began.argmax(axis=0)]
+
+
+def test_trot_by_hand():
+    trot = GAITS["trot"]  # duty .55, diagonal pairs half a cycle apart
+    np.testing.assert_allclose(trot.leg_phase(0.2), [0.2, 0.7, 0.7, 0.2])
+    assert trot.stance(0.2).tolist() == [True, False, False, True]
+    assert trot.stance(0.52).tolist() == [True, True, True, True]
+    assert trot.stance(0.6).tolist() == [False, True, True, False]
+    np.testing.assert_allclose(trot.swing_progress(0.2), [0, 0.15 / 0.45, 0.15 / 0.45, 0])
+    assert (trot.stance_s, trot.swing_s, trot.step_rate) == pytest.approx((0.22, 0.18, 2.5))
+
+
+def test_walk_by_hand():
+    walk = GAITS["walk"]  # duty .78, offsets FL .25 FR .75 RL 0 RR .5
+    np.testing.assert_allclose(walk.leg_phase(0.1), [0.35, 0.85, 0.1, 0.6])
+    assert walk.stance(0.1).tolist() == [True, False, True, True]
+    np.testing.assert_allclose(walk.swing_progress(0.1)[1], 0.07 / 0.22)
+
+
+def test_walk_is_four_beat():
+    walk = GAITS["walk"]
+    beats = touchdown_phases(walk)
+    np.testing.assert_allclose(np.diff(np.sort(beats)), 0.25, atol=1e-3)
+    assert np.array(["FL", "FR", "RL", "RR"])[np.argsort(beats)].tolist() == ["RL", "FR", "RR", "FL"] or np.array(
+        ["FL", "FR", "RL", "RR"]
+    )[np.argsort(beats)].tolist() == ["RL", "FL", "RR", "FR"], "a hind foot is followed by the front foot of a side"
+    assert 0.7 <= walk.duty <= 0.8
+    assert walk.stance(np.linspace(0, 1, 997)).sum(axis=1).min() >= 3, "never fewer than three feet on the ground"
+
+
+def test_trot_moves_diagonal_pairs():
+    beats = touchdown_phases(GAITS["trot"])
+    assert beats[0] == beats[3] and beats[1] == beats[2] and abs(beats[0] - beats[1]) == pytest.approx(0.5)
+
+
+def test_bound_moves_front_and_hind_pairs():
+    beats = touchdown_phases(GAITS["bound"])
+    assert beats[0] == beats[1] and beats[2] == beats[3] and abs(beats[0] - beats[2]) == pytest.approx(0.5)
+
+
+def test_jump_moves_all_feet_together_and_leaves_the_ground():
+    jump = GAITS["jump"]
+    assert len(set(touchdown_phases(jump))) == 1
+    support = jump.stance(np.arange(1000) / 1000).sum(axis=1)
+    assert set(support) == {0, 4}
+    assert (support == 0).mean() == pytest.approx(1 - jump.duty, abs=2e-3)
+
+
+@EVERY
+def test_phase_is_periodic(gait):
+    phase = np.random.default_rng(0).uniform(0, 1, 50)
+    np.testing.assert_allclose(gait.leg_phase(phase + 3), gait.leg_phase(phase), atol=1e-12)
+    np.testing.assert_allclose(gait.leg_phase(phase - 3), gait.leg_phase(phase), atol=1e-12)
+    assert gait.leg_phase(phase).shape == (50, 4) and gait.leg_phase(0.3).shape == (4,)
+
+
+@EVERY
+def test_swing_progress_is_zero_in_stance_and_rises_to_one(gait):
+    phase = np.arange(5000) / 5000
+    progress, stance = gait.swing_progress(phase), gait.stance(phase)
+    assert (progress[stance] == 0).all()
+    assert progress[~stance].max() == pytest.approx(1.0, abs=2e-3) and progress.max() <= 1
+    slope = np.diff(progress, axis=0)[~stance[1:] & ~stance[:-1]]
+    np.testing.assert_allclose(slope, 1 / 5000 / (1 - gait.duty), rtol=1e-6)
+
+
+@EVERY
+@pytest.mark.parametrize("dt", [0.013, 0.025, 0.05])
+def test_contact_schedule_is_the_integral_of_stance(gait, dt):
+    for phase in (0.0, 0.1234, 0.77):
+        schedule = gait.contact_schedule(phase, dt, 9)
+        fine = (np.arange(9 * 2000) + 0.5) / 2000  # midpoints, 2000 in each interval
+        integral = gait.stance(phase + fine * dt / gait.period).reshape(9, 2000, 4).mean(axis=1)
+        np.testing.assert_allclose(schedule, integral, atol=1.1e-3)
+        assert schedule.min() >= 0 and schedule.max() <= 1
+
+
+@EVERY
+def test_contact_schedule_over_a_cycle_has_the_duty_as_mean(gait):
+    for phase in np.linspace(0, 1, 7):
+        schedule = gait.contact_schedule(phase, gait.period / 16, 16)
+        np.testing.assert_allclose(schedule.mean(axis=0), gait.duty, atol=1e-12)
+
+
+def test_contact_schedule_by_hand():
+    schedule = GAITS["trot"].contact_schedule(0.0, 0.04, 10)[:, 0]  # tenths of a cycle; lift-off at .55
+    np.testing.assert_allclose(schedule, [1, 1, 1, 1, 1, 0.5, 0, 0, 0, 0], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"name": ""}, "name"),
+        ({"period": 0.1}, r"period.*'trot'.*\[0.15, 3\].*0.1"),
+        ({"duty": 1.0}, "duty.*got 1"),
+        ({"duty": float("nan")}, "duty.*nan"),
+        ({"swing_height": 0.0}, "swing_height"),
+        ({"offsets": (0.0, 0.5)}, r"offsets.*\(4,\).*\(2,\)"),
+        ({"offsets": (0.0, 0.5, float("inf"), 0.0)}, "offsets.*finite"),
+    ],
+)
+def test_impossible_gaits_are_refused(change, words):
+    with pytest.raises(InvalidInputError, match=words):
+        dataclasses.replace(GAITS["trot"], **change)
+
+
+def test_gaits_cannot_be_changed():
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        GAITS["trot"].duty = 0.4
+    with pytest.raises(TypeError):
+        GAITS["trot"] = GAITS["walk"]

@@ -1,0 +1,107 @@
+"""Collecting demonstrations: right labels, pure, resumable."""
+
+import dataclasses
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from go1_mtl_gym.errors import InvalidInputError
+from tests.trainer.stub_env import HIPS, THIGHS, StubEnv, make_stub
+from trainers import CollectJob, Demonstrations, PerturbationConfig, ShardMismatchError, collect, collect_all
+from trainers.collection import CollectionError
+
+LAYOUT = {"q": slice(6, 18), "command": slice(34, 37), "phase": slice(37, 39), "last_action": slice(39, 51)}
+
+
+def expected_labels(demos: Demonstrations) -> np.ndarray:
+    """The stub expert's answer, recomputed from what was recorded as seen."""
+    offsets = np.array(StubEnv("trot").task.gait.offsets)
+    sine, cosine = demos.obs[:, LAYOUT["phase"]].T
+    phase = np.arctan2(sine, cosine)[:, None] + 2 * np.pi * offsets
+    labels = np.zeros((len(demos), 12))
+    labels[:, HIPS] = demos.obs[:, LAYOUT["command"]]
+    labels[:, THIGHS] = 0.9 * np.sin(phase)
+    labels[:, 2::3] = -0.5 * demos.obs[:, LAYOUT["q"]][:, 2::3]
+    return labels
+
+
+@pytest.mark.parametrize("perturbation", [None, PerturbationConfig(noise_rad=0.2)])
+def test_labels_belong_to_the_state_seen(perturbation):
+    demos = collect("trot", seed=4, seconds=5.0, perturbation=perturbation, make_env=make_stub)
+    assert len(demos) == 250 and demos.control_hz == 50 and set(demos.task) == {0}
+    np.testing.assert_allclose(demos.acts, expected_labels(demos), atol=1e-5)
+    executed, wanted = demos.obs[1:, LAYOUT["last_action"]], demos.acts[:-1]
+    assert np.allclose(executed, wanted, atol=1e-6) == (perturbation is None)
+
+
+def test_pure_function_of_its_arguments():
+    one, same = (collect("jump", seed=7, seconds=2.0, make_env=make_stub) for _ in range(2))
+    np.testing.assert_array_equal(one.obs, same.obs)
+    other = collect("jump", seed=8, seconds=2.0, make_env=make_stub)
+    assert not np.array_equal(one.obs, other.obs)
+
+
+def test_command_is_kept_even_when_perturbed():
+    perturbation = PerturbationConfig(command_interval=(0.2, 0.3))
+    demos = collect("trot", (0.5, 0.0, 0.0), 0, 10.0, perturbation, make_env=make_stub)
+    np.testing.assert_allclose(demos.obs[-1, LAYOUT["command"]], [0.5, 0, 0], atol=1e-3)
+
+
+def test_end_before_a_fall_is_dropped():
+    demos = collect("trot", seed=0, seconds=2.0, env_kwargs={"expert_falls_after_s": 1.0}, make_env=make_stub)
+    assert len(demos) == 100
+    lengths = [rows.stop - rows.start for rows in demos.episodes()]
+    assert lengths == [39, 39, 22]  # 51 steps to the fall less 12
+    assert demos.acts[:, 2].max() < 0.9
+
+
+def test_expert_that_always_falls():
+    with pytest.raises(CollectionError, match="keeps falling"):
+        collect("trot", seconds=4.0, env_kwargs={"expert_falls_after_s": 0.1}, make_env=make_stub)
+
+
+def test_resume_keeps_good_shards_and_remakes_damaged_ones(tmp_path):
+    jobs = [CollectJob("trot", seed, 1.0) for seed in range(3)]
+    jobs.append(CollectJob("walk", 0, 1.0, perturbation=PerturbationConfig()))
+    paths = collect_all(jobs[:2], tmp_path, make_env=make_stub)
+    stamps = [p.stat().st_mtime_ns for p in paths]
+    paths[1].write_bytes(b"half")
+    paths = collect_all(jobs, tmp_path, make_env=make_stub)
+    assert [p.name for p in paths[:3]] == ["trot-clean-000000.npz", "trot-clean-000001.npz", "trot-clean-000002.npz"]
+    assert paths[0].stat().st_mtime_ns == stamps[0]
+    shards = [Demonstrations.load(p) for p in paths]
+    assert [len(s) for s in shards] == [50] * 4 and shards[3].meta["job"] == jobs[3].as_dict()
+    np.testing.assert_array_equal(shards[1].obs, collect("trot", seed=1, seconds=1.0, make_env=make_stub).obs)
+
+
+def test_other_settings_in_the_same_folder(tmp_path):
+    job = CollectJob("trot", 0, 1.0)
+    collect_all([job], tmp_path, make_env=make_stub)
+    with pytest.raises(ShardMismatchError, match="was made from"):
+        collect_all([dataclasses.replace(job, seconds=2.0)], tmp_path, make_env=make_stub)
+
+
+def test_jobs_must_differ(tmp_path):
+    with pytest.raises(InvalidInputError, match="differ"):
+        collect_all([CollectJob("trot", 0)] * 2, tmp_path, make_env=make_stub)
+
+
+def test_worker_processes_make_the_same_shards(tmp_path):
+    jobs = [CollectJob("trot", s, 1.0) for s in range(2)]
+    here = collect_all(jobs, tmp_path / "here", make_env=make_stub)
+    there = collect_all(jobs, tmp_path / "there", n_jobs=2, make_env=make_stub)
+    for one, other in zip(here, there):
+        np.testing.assert_array_equal(Demonstrations.load(one).obs, Demonstrations.load(other).obs)
+
+
+@pytest.mark.parametrize("kwargs", [{"noise_rad": -1}, {"kick_interval": 0}, {"command_interval": (3, 1)}])
+def test_bad_perturbation(kwargs):
+    with pytest.raises(InvalidInputError):
+        PerturbationConfig(**kwargs)
+
+
+def test_collecting_does_not_load_torch():
+    code = "import sys, trainers.collection; assert not {'torch', 'imitation', 'pinocchio', 'osqp'} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)

@@ -1,0 +1,57 @@
+"""TensorBoard log and figures."""
+
+import numpy as np
+import pytest
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+import trainers
+from go1_mtl_gym.errors import InvalidInputError
+from tests.trainer.stub_env import make_stub
+from trainers import evaluate, joint_target_figure, log_figure, log_round, log_text, make_logger, offline_metrics
+
+
+def test_round_text_and_figure_reach_tensorboard(policy, demos, tmp_path):
+    logger = make_logger(tmp_path)
+    result = evaluate("expert", "trot", 1, 3.0, make_env=make_stub)
+    log_round(logger, 2, {"trot": result}, offline_metrics(policy, demos))
+    log_text(logger, "config", {"seed": 1, "nan": float("nan")})
+    log_figure(logger, "joint_targets", joint_target_figure(policy, demos), 2)
+    logger.close()
+    events = EventAccumulator(str(tmp_path)).Reload()
+    tags = events.Tags()
+    wanted = {"closed_loop/success_rate/trot", "closed_loop/velocity_error/trot", "offline/r2/walk"}
+    assert wanted <= set(tags["scalars"])
+    scalar = events.Scalars("closed_loop/success_rate/trot")[0]
+    assert (scalar.step, scalar.value) == (2, 1.0)
+    assert tags["images"] == ["joint_targets"] and "config/text_summary" in tags["tensors"]
+
+
+def test_silent_logger_writes_nothing(capsys):
+    logger = make_logger()
+    logger.record("a", 1.0)
+    logger.dump(0)
+    assert capsys.readouterr() == ("", "")
+
+
+def test_figure_shows_both_in_radians(policy, demos, tmp_path):
+    figure = joint_target_figure(policy, demos, seconds=2.0)
+    axes = np.array(figure.axes).reshape(4, 3)
+    expert, predicted = axes[0, 1].lines
+    trot = demos.per_task()["trot"]
+    episode = next(trot.episodes())
+    rows = slice(episode.stop - 100, episode.stop)
+    np.testing.assert_allclose(expert.get_ydata(), 0.9 + trot.half_range[1] * trot.acts[rows, 1], rtol=1e-6)
+    wanted = 0.9 + trot.half_range[1] * policy.predict(trot.obs[rows], deterministic=True)[0][:, 1]
+    np.testing.assert_allclose(predicted.get_ydata(), wanted, rtol=1e-5)
+    figure.savefig(tmp_path / "f.png")
+    assert (tmp_path / "f.png").stat().st_size > 1000
+    with pytest.raises(InvalidInputError, match="nothing to draw"):
+        joint_target_figure(policy, {})
+
+
+def test_public_names():
+    assert set(trainers.__all__) == set(trainers._HOME)
+    assert all(getattr(trainers, name) is not None for name in trainers.__all__)
+    assert set(trainers.__all__) <= set(dir(trainers))
+    with pytest.raises(AttributeError, match="has no attribute 'nonsense'"):
+        _ = trainers.nonsense
