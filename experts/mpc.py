@@ -36,7 +36,8 @@ class MPCConfig:
         min_force: f_min of a foot that stays on the ground throughout an interval [N]; keeps contacts from chattering.
         tolerance: eps_abs and eps_rel of OSQP.
         rho: ADMM step of OSQP; fixed, so that a solution depends on its problem alone.
-        max_iterations: of OSQP; what it has by then is used if its residuals are below `INEXACT`, else the solve failed.
+        max_iterations: of OSQP; what it has by then is used if its residuals are below `INEXACT`, else the solve
+            failed.
 
     Raises:
         InvalidInputError: if a figure is outside its range.
@@ -110,9 +111,7 @@ class QuadraticProgram:
 
     def __post_init__(self) -> None:
         n = self.config.steps
-        self._weight = np.concatenate(
-            [np.tile(self.config.state_weight, n), np.full(n * NU, self.config.input_weight)]
-        )
+        self._weight = np.concatenate([np.tile(self.config.state_weight, n), np.full(n * NU, self.config.input_weight)])
         self.P = sparse.diags(self._weight, format="csc")
         dynamics = _linear_model_pattern()
         identity = sparse.eye(n * NX)
@@ -126,9 +125,7 @@ class QuadraticProgram:
         dense = numbered.toarray().astype(int) - 1
         self._slot_a = np.stack([dense[NX * k : NX * (k + 1), NX * (k - 1) : NX * k] for k in range(1, n)])
         first = n * NX
-        self._slot_b = np.stack(
-            [dense[NX * k : NX * (k + 1), first + NU * k : first + NU * (k + 1)] for k in range(n)]
-        )
+        self._slot_b = np.stack([dense[NX * k : NX * (k + 1), first + NU * k : first + NU * (k + 1)] for k in range(n)])
         self._used_a, self._used_b = self._slot_a >= 0, self._slot_b >= 0
         self._slot_a, self._slot_b = self._slot_a[self._used_a], self._slot_b[self._used_b]
         self.A = pattern
@@ -178,8 +175,8 @@ def _linear_model_pattern() -> LinearModel:
 class MPC:
     """Solves `QuadraticProgram`s in one OSQP workspace that is set up once and only updated afterwards.
 
-    The start of each solve is the reference itself with zero multipliers, not the previous solution: with a fixed rho the
-    answer then depends on the problem alone and asking twice gives the same bits.
+    Each solve starts from the reference itself with zero multipliers, not from the previous solution: with a fixed rho
+    the answer then depends on the problem alone, and asking twice gives the same bits.
 
     Args:
         config: sizes, weights, limits and solver settings.

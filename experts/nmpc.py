@@ -5,8 +5,12 @@ One call runs once through the chain
     state -> Pinocchio -> reference and footholds -> model linearised along the reference -> QP -> ground forces
           -> whole-body torques -> joint targets of the PD actuators.
 
-The model of `experts.dynamics` is nonlinear in attitude and position; it is linearised anew along the predicted reference
-at every call and solved once (one real-time iteration), not iterated to convergence.
+The model of `experts.dynamics` is nonlinear in attitude and position; it is linearised anew along the predicted
+reference at every call and solved once (one real-time iteration), not iterated to convergence.
+
+The actuators hold a joint target for a whole control period, during which the joints move on. The target is therefore
+the one whose torque is right in the middle of the period, at q + v h/2 + vdot h^2/8 and v + vdot h/2 for a period h; as
+h goes to zero this becomes a = q + (tau + kd v)/kp.
 
 Nothing is remembered from call to call but counters and the last good forces for the case that a solve fails, so the
 action is a function of the `RobotState`.
@@ -77,6 +81,7 @@ class NMPCExpert:
 
     Args:
         gains: of the PD actuators that will track the targets.
+        hold_s: for how long each target is held [s]; the environment's control period.
         config: see `NMPCConfig`.
 
     Attributes:
@@ -85,7 +90,7 @@ class NMPCExpert:
 
     def __init__(self, gains: PDGains | None = None, hold_s: float = 0.02, config: NMPCConfig | None = None) -> None:
         self.gains = gains or PDGains()
-        self.hold_s = hold_s
+        self.hold_s = number_in(hold_s, 0.0, 0.1, "hold_s [s]")
         self.config = config or NMPCConfig()
         self.counters = Counters()
         self._model = RobotModel()
@@ -128,9 +133,7 @@ class NMPCExpert:
         motion = self.motion(state)
         reference = body_reference(state, dynamics.com_w, motion, config.com_height, dt, steps)
         contact = gait.contact_schedule(state.phase, dt, steps)
-        feet = config.footholds.over_horizon(
-            state, dynamics.com_w, dynamics.com_velocity_w, dynamics.feet_w, dt, steps
-        )
+        feet = config.footholds.over_horizon(state, dynamics.com_w, dynamics.com_velocity_w, dynamics.feet_w, dt, steps)
         middle = state.phase + (np.arange(steps) + 0.5) / steps
         load = motion.load_at(middle) * (robot.MASS * robot.GRAVITY)
         model = linearise(reference, feet, load, dynamics.inertia_w, dt)

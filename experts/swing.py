@@ -22,8 +22,8 @@ class SwingRule:
         stiffness: [1/s^2].
         damping: [1/s].
         press: how far below the ground the touchdown is aimed, so that contact is certain [m].
-        early: share of the swing at whose end the foot is down already and waits, so that it is not thrown at the ground
-            when its stance begins.
+        early: share of the swing, at its end, for which the foot is down already and waits, so that it is not thrown at
+            the ground when its stance begins.
     """
 
     stiffness: float = 400.0

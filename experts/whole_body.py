@@ -28,8 +28,8 @@ def joint_torques(
         swing_acceleration_w: world [m/s^2], shape (4, 3); used only where `stance` is False.
 
     Returns:
-        Joint torques [N m], shape (12,), clipped at the torque limits, and the joint accelerations [rad/s^2], shape (12,),
-        that they were computed for.
+        Joint torques [N m], shape (12,), clipped at the torque limits, and the joint accelerations [rad/s^2], shape
+        (12,), that they were computed for.
     """
     force = np.where(stance[:, None], forces_w, 0.0).ravel()
     foot = np.where(stance[:, None], -STANCE_DAMPING * dynamics.feet_velocity_w, swing_acceleration_w)

@@ -42,8 +42,8 @@ class Go1Env(gymnasium.Env):
 
     Reward: velocity and yaw rate tracking, posture, effort, alive; itemised in ``info["reward_terms"]``.
 
-    Episode: starts standing at phase 0 of the gait clock; terminates on a fall (trunk below 0.14 m or tilted by more than
-    60 degrees) or when the physics diverges; truncates after `episode_s`.
+    Episode: starts standing at phase 0 of the gait clock; terminates on a fall (trunk below 0.14 m or tilted by more
+    than 60 degrees) or when the physics diverges; truncates after `episode_s`.
 
     Info: task, command (asked for), filtered_command (seen by expert and student), base_velocity (measured vx, vy, yaw
     rate in the heading frame), contacts, phase, reward_terms, fallen, ended ("", "fall", "unstable" or "time").
@@ -60,8 +60,9 @@ class Go1Env(gymnasium.Env):
         kd: damping of the actuators [N m s/rad].
         noise: True for the default `SensorNoise`, or one of your own; None for exact sensors.
         episode_s: length of an episode [s].
-        expert: ``"module:Class"`` or a callable; called with ``gains=PDGains`` on first use, must give an object with
-            ``reset(state)`` and ``action(state)`` that returns 12 joint targets [rad] for a `RobotState`.
+        expert: ``"module:Class"`` or a callable; called with ``gains=PDGains, hold_s=control period`` on first use,
+            must give an object with ``reset(state)`` and ``action(state)``, which returns 12 joint targets [rad] for a
+            `RobotState`.
         render_mode: None, "human" or "rgb_array".
         width, height: size of the picture [pixels].
 
@@ -244,7 +245,7 @@ class Go1Env(gymnasium.Env):
         """The expert's action for the present state, float32, shape (12,). Changes nothing, here or later."""
         state = self.state
         if self._expert is None:
-            self._expert = _load_expert(self._arguments["expert"])(gains=self.gains)
+            self._expert = _load_expert(self._arguments["expert"])(gains=self.gains, hold_s=self.control_s)
             self._expert.reset(state)
         return self.action_map.from_radians(self._expert.action(state)).astype(np.float32)
 

@@ -11,7 +11,7 @@
 | gravity       | 3    | -       | channel      | unit vector of gravity, trunk frame                                |
 | phase         | 2    | -       | channel      | sine and cosine of the gait clock                                  |
 | last_action   | 12   | -       | channel      | the action applied during the last step                            |
-| history       | 34 (n - 1) | as above | history = n > 1 | the n - 1 proprioceptive frames before this one, newest first |
+| history       | 34 (n - 1) | as above | history = n | the n - 1 proprioceptive frames before this one, newest first |
 | task          | K    | 0 or 1  | yes          | one-hot task id, in the order of the environment's `tasks`         |
 """
 

@@ -38,8 +38,8 @@ def reward_terms(
 
     Returns:
         velocity: exp(-|v_xy - command_xy|^2 / 0.25); yaw_rate: exp(-(w - command_w)^2 / 0.25);
-        posture: minus (squared tilt + squared height error in units of 0.1 m, at most 4); effort: minus the mean squared
-        share of the torque limits; alive: 1. Each times its weight.
+        posture: minus (squared tilt + squared height error in units of 0.1 m, at most 4); effort: minus the mean
+        squared share of the torque limits; alive: 1. Each times its weight.
     """
     error = base_velocity - command
     tilt = gravity_b[0] ** 2 + gravity_b[1] ** 2

@@ -69,7 +69,7 @@ class RobotState:
 
     @property
     def base_velocity(self) -> np.ndarray:
-        """Measured (vx, vy [m/s], yaw rate [rad/s]) in the heading frame (world turned by the yaw angle), shape (3,)."""
+        """Measured (vx, vy [m/s], yaw rate [rad/s]) in the heading frame (world turned by yaw), shape (3,)."""
         yaw = self.rpy[2]
         cos, sin = np.cos(yaw), np.sin(yaw)
         vx, vy, _ = self.linear_velocity_w

@@ -66,7 +66,7 @@ TASKS = MappingProxyType(
         task.name: task
         for task in (
             Task("trot", GAITS["trot"], command_range=(0.8, 0.3, 0.5)),
-            Task("bound", GAITS["bound"], command_range=(0.5, 0.2, 0.5)),
+            Task("bound", GAITS["bound"], command_range=(0.5, 0.3, 0.5)),
             Task("jump", GAITS["jump"], command_range=(0.5, 0.3, 0.5)),
             Task("walk", GAITS["walk"], command_range=(0.5, 0.3, 0.5)),
         )

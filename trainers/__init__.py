@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from trainers.losses import MultiTaskLoss
     from trainers.metrics import offline_metrics
     from trainers.policy import MultiHeadPolicy
+    from trainers.recording import record_frames, save_gif, tile
+    from trainers.report import paper_table, results_table
     from trainers.tensorboard import log_figure, log_round, log_text, make_logger
 
 _HOME = {
@@ -54,6 +56,11 @@ _HOME = {
     "make_logger": "tensorboard",
     "make_venv": "environments",
     "offline_metrics": "metrics",
+    "paper_table": "report",
+    "record_frames": "recording",
+    "results_table": "report",
+    "save_gif": "recording",
+    "tile": "recording",
     "train_bc": "bc",
 }
 
@@ -87,6 +94,11 @@ __all__ = [
     "make_logger",
     "make_venv",
     "offline_metrics",
+    "paper_table",
+    "record_frames",
+    "results_table",
+    "save_gif",
+    "tile",
     "train_bc",
 ]
 

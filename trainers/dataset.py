@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.observation import FRAME_SIZE
 from trainers.files import write_atomically
 
 if TYPE_CHECKING:
@@ -100,6 +101,11 @@ class Demonstrations:
         """The rows of each task that has any, in head order."""
         task = self.task
         return {name: self.take(task == k) for k, name in enumerate(self.tasks) if (task == k).any()}
+
+    def proprioceptive(self) -> "Demonstrations":
+        """The same rows as seen without channels and history: the first 34 numbers and the task id."""
+        obs = np.concatenate([self.obs[:, :FRAME_SIZE], self.obs[:, -len(self.tasks) :]], axis=1)
+        return dataclasses.replace(self, obs=obs)
 
     def split(self, fraction: float, seed: int) -> tuple["Demonstrations", "Demonstrations"]:
         """Training and held-out rows; whole episodes are held out, at least one per task.

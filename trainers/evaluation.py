@@ -10,15 +10,15 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 from tqdm.auto import tqdm
 
-from go1_mtl_gym import TASKS
+from go1_mtl_gym import TASKS, Gait
 from go1_mtl_gym.errors import InvalidInputError
 from trainers.environments import EnvFactory, derive_seed, make_env
 from trainers.metrics import json_ready, touchdowns, tracking_error, wilson_interval
 
 SETTLE_S = 2.0
 """Start of an episode that counts for survival only [s]."""
-MIN_AIR_S = 0.04
-"""A foot that was off the ground for less has bounced, not stepped [s]."""
+MIN_AIR_SHARE = 0.5
+"""A foot that was off the ground for less than this share of the gait's planned swing has bounced, not stepped."""
 VELOCITY_TOLERANCE = 0.15
 """Largest velocity error of a success [m/s]."""
 STEP_RATE_TOLERANCE = 0.25
@@ -36,7 +36,8 @@ class EpisodeRecord:
         fallen: whether it fell.
         velocity_error: `trainers.metrics.tracking_error` after the first 2 s [m/s]; NaN if it fell too early to tell.
         yaw_rate_error: likewise [rad/s].
-        step_rate: touchdowns per second of each leg after the first 2 s [1/s]; NaN if it fell within them.
+        step_rate: touchdowns per second of each leg after the first 2 s [1/s], each after at least half a planned swing in
+            the air; NaN if it fell within them.
         success: survived, velocity error <= 0.15 m/s, and every leg's rate within 25 % of 1 / gait period.
     """
 
@@ -153,7 +154,7 @@ def evaluate(
         raise InvalidInputError("commands must be None or hold at least one (vx, vy, yaw rate), got none")
     if command_interval is not None and not command_interval > 0:
         raise InvalidInputError(f"command_interval must be None or positive, got {command_interval}")
-    _controller(policy_or_expert, None)
+    controller(policy_or_expert, None)
     kwargs = {**getattr(policy_or_expert, "env_kwargs", {}), **env_kwargs, "episode_s": seconds}
 
     def call(i: int) -> tuple[Any, ...]:
@@ -197,7 +198,7 @@ def _run(
     seconds: float,
 ) -> EpisodeRecord:
     base = env.unwrapped
-    act = _controller(policy_or_expert, base)
+    act = controller(policy_or_expert, base)
     rng = np.random.default_rng(derive_seed("commands", seed))
     options = {"task": task} | ({} if command is None else {"command": command})
     obs, info = env.reset(seed=seed, options=options)
@@ -219,7 +220,7 @@ def _run(
     if truncated and not terminated and done < steps:
         raise InvalidInputError(f"the environment ended an episode of {seconds:g} s after {done / base.control_hz:g} s")
     series = (measured[:done], wanted[:done], contacts[:done])
-    return _score(*series, bool(terminated), seed, tuple(given), TASKS[task].gait.period, base.control_hz)
+    return _score(*series, bool(terminated), seed, tuple(given), TASKS[task].gait, base.control_hz)
 
 
 def _score(
@@ -229,18 +230,18 @@ def _score(
     fallen: bool,
     seed: int,
     commands: tuple[tuple[float, float, float], ...],
-    period: float,
+    gait: Gait,
     control_hz: float,
 ) -> EpisodeRecord:
     """Figures of one episode from what was measured after each step."""
     skip = round(SETTLE_S * control_hz)
-    velocity_error, yaw_error = tracking_error(measured, wanted, max(1, round(period * control_hz)), skip)
+    velocity_error, yaw_error = tracking_error(measured, wanted, max(1, round(gait.period * control_hz)), skip)
     counted_s = (len(measured) - skip) / control_hz
     if counted_s > 0:
-        rate = touchdowns(contacts, math.ceil(MIN_AIR_S * control_hz - 1e-9), skip) / counted_s
+        rate = touchdowns(contacts, math.ceil(MIN_AIR_SHARE * gait.swing_s * control_hz - 1e-9), skip) / counted_s
     else:
         rate = np.full(4, np.nan)
-    stepped = bool((np.abs(rate * period - 1.0) <= STEP_RATE_TOLERANCE).all())
+    stepped = bool((np.abs(rate / gait.step_rate - 1.0) <= STEP_RATE_TOLERANCE).all())
     return EpisodeRecord(
         seed=seed,
         commands=commands,
@@ -253,7 +254,7 @@ def _score(
     )
 
 
-def _controller(policy_or_expert: Any, env: Any) -> Callable[[np.ndarray], np.ndarray]:
+def controller(policy_or_expert: Any, env: Any) -> Callable[[np.ndarray], np.ndarray]:
     """What turns an observation of `env` into an action."""
     if isinstance(policy_or_expert, str) and policy_or_expert == "expert":
         return lambda obs: env.expert_action()

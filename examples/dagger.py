@@ -1,0 +1,299 @@
+"""The main job: expert demonstrations, cloning, DAgger, evaluation, pictures.
+
+    python examples/dagger.py                      about 15 minutes on 2 cores, results under runs/<date>
+    python examples/dagger.py --preset smoke       two minutes, to see that everything works
+
+Every stage leaves its result on disk; Ctrl-C keeps what is done and the same command with ``--out`` goes on from there.
+"""
+
+# ruff: noqa: E402 (OpenGL is chosen before MuJoCo is imported)
+
+import dataclasses
+import json
+import shlex
+import sys
+import time
+from collections.abc import Callable
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import headless
+
+NO_GL = headless.choose_gl()
+
+import joblib
+from dagger_config import JobConfig, parse
+from dagger_students import new_policy, train_baseline
+from tqdm.auto import tqdm
+
+import trainers
+from go1_mtl_gym import TASKS, Go1Error
+from go1_mtl_gym.rendering import RenderingError
+from trainers.checkpoint import versions
+from trainers.files import write_atomically
+from trainers.metrics import json_ready
+
+LEARNERS = ("multi_head", "pooled", "paper_literal")
+
+
+class Job:
+    """One run of the main job in one folder.
+
+    Args:
+        config: what to do.
+        out: folder of the results; made if missing.
+
+    Raises:
+        InvalidInputError: if the folder holds a run with other settings.
+    """
+
+    def __init__(self, config: JobConfig, out: Path) -> None:
+        self.config = config
+        self.out = out
+        self._claim()
+        self._times_path = out / "parts" / "seconds.json"
+        self.seconds: dict[str, float] = _read_json(self._times_path) or {}
+        self.logger = trainers.make_logger(out / "tensorboard")
+        trainers.log_text(self.logger, "configuration", dataclasses.asdict(config))
+
+    def run(self) -> dict[str, Any]:
+        """All stages, in order; returns what ``metrics.json`` holds."""
+        train, held_out = self.demonstrations()
+        policies = {"multi_head": self.student(train, held_out)}
+        policies |= self.baselines()
+        metrics = self.evaluate(policies, held_out)
+        self.pictures(policies["multi_head"], held_out)
+        return metrics
+
+    # -- Demonstrations ------------------------------------------------------------------------------------------------
+
+    def demonstrations(self) -> tuple[trainers.Demonstrations, trainers.Demonstrations]:
+        """Training rows (clean and perturbed) and held-out rows (clean, other commands and seeds)."""
+        config = self.config
+        disturbed = trainers.PerturbationConfig()
+        train = self._jobs(config.clean_s, None, 0) + self._jobs(config.perturbed_s, disturbed, 1)
+        held_out = self._jobs(config.held_out_s, None, 2)
+        with self.stage("demonstrations"):
+            paths = trainers.collect_all(train + held_out, self.out / "demonstrations", config.n_envs, progress=True)
+        shards = [trainers.Demonstrations.load(path) for path in paths]
+        return (
+            trainers.Demonstrations.concatenate(shards[: len(train)]),
+            trainers.Demonstrations.concatenate(shards[len(train) :]),
+        )
+
+    def _jobs(self, seconds: float, disturbed: trainers.PerturbationConfig | None, block: int) -> list:
+        """Shards of `seconds` per task; their seeds lie in a block of their own."""
+        config = self.config
+        count = round(seconds / config.shard_s)
+        first = (config.seed * 10 + block) * 10_000
+        return [
+            trainers.CollectJob(task, first + i, config.shard_s, None, disturbed, config.env_kwargs)
+            for i in range(count)
+            for task in config.tasks
+        ]
+
+    # -- Students ------------------------------------------------------------------------------------------------------
+
+    def student(self, train: trainers.Demonstrations, held_out: trainers.Demonstrations) -> Any:
+        """The multi-head policy: cloned, then improved by DAgger."""
+        config, path = self.config, self.out / "parts" / "cloned.zip"
+        if path.is_file():
+            policy = trainers.load(path, config.device)
+        else:
+            policy = new_policy(config, config.env_kwargs)
+            with self.stage("clone"):
+                trainers.train_bc(policy, train, config.bc, held_out, self.logger, progress=True)
+            policy.save(path)
+        if config.rounds:
+            policy = self._dagger(policy, train, held_out)
+        else:
+            self._everything(train)
+        policy.save(self.out / "policy.zip")
+        return policy
+
+    def _dagger(self, policy: Any, train: trainers.Demonstrations, held_out: trainers.Demonstrations) -> Any:
+        config = self.config
+        changing = trainers.PerturbationConfig(noise_rad=0.02)
+        per_task = max(1, config.n_envs // len(config.tasks))
+        venv = trainers.make_venv(config.tasks, per_task, config.env_kwargs, changing, subproc=config.n_envs > 1)
+        try:
+            trainer = trainers.DAggerTrainer(
+                venv,
+                policy,
+                train,
+                config.dagger,
+                config.round_bc,
+                scratch_dir=self.out / "dagger",
+                logger=self.logger,
+                validation=held_out,
+                progress=True,
+            )
+            with self.stage("dagger"):
+                while trainer.round_num < config.rounds:
+                    rows = trainer.collect_round()
+                    train = trainers.Demonstrations.concatenate([train, rows])
+                    trainer.train_round()
+                    self._watch(trainer.policy, held_out, trainer.round_num)
+        finally:
+            venv.close()
+        self._everything(train)
+        return trainer.policy
+
+    def _everything(self, rows: trainers.Demonstrations) -> None:
+        """Leave all training rows for the baselines, which learn from the same data."""
+        rows.save(self.out / "parts" / "all_rows.npz")
+
+    def _watch(self, policy: Any, held_out: trainers.Demonstrations, round_num: int) -> None:
+        """A quick look at the closed loop and the one-step errors, for TensorBoard."""
+        closed_loop = {
+            task: self.closed_loop(policy, f"round-{round_num}", task, self.config.round_episodes)
+            for task in self.config.tasks
+        }
+        trainers.log_round(self.logger, round_num, offline=trainers.offline_metrics(policy, held_out))
+        for task, result in closed_loop.items():
+            for name in ("success_rate", "survival_rate", "velocity_error"):
+                self.logger.record(f"closed_loop/{name}/{task}", result[name])
+        self.logger.dump(round_num)
+
+    def baselines(self) -> dict[str, Any]:
+        """The pooled and the paper-literal student, on the same rows with as many gradient steps, side by side."""
+        names = [name for name in LEARNERS[1:] if not (name == "paper_literal" and self._is_literal)]
+        missing = [name for name in names if not self._path(name).is_file()]
+        if missing:
+            jobs = min(len(missing), self.config.n_envs) if self.config.device == "cpu" else 1
+            parallel = joblib.Parallel(n_jobs=jobs, return_as="generator_unordered")
+            calls = (joblib.delayed(train_baseline)(self.config, name, self.out, jobs) for name in missing)
+            with self.stage("baselines"):
+                for _ in tqdm(parallel(calls), "baselines", len(missing), unit="network"):
+                    pass
+        return {name: trainers.load(self._path(name)) for name in names}
+
+    @property
+    def _is_literal(self) -> bool:
+        return not self.config.channels and self.config.history == 1
+
+    def _path(self, name: str) -> Path:
+        return self.out / "parts" / f"{name}.zip"
+
+    # -- Evaluation ----------------------------------------------------------------------------------------------------
+
+    def evaluate(self, policies: dict[str, Any], held_out: trainers.Demonstrations) -> dict[str, Any]:
+        """One-step errors and closed loop of everybody; writes ``metrics.json``."""
+        config = self.config
+        tasks: dict[str, dict[str, Any]] = {task: {} for task in config.tasks}
+        for name, policy in policies.items():
+            rows = held_out.proprioceptive() if name == "paper_literal" else held_out
+            for task, scores in trainers.offline_metrics(policy, rows).items():
+                tasks[task][name] = scores
+        with self.stage("evaluation"):
+            for name, policy in {"expert": "expert", **policies}.items():
+                for task in config.tasks:
+                    tasks[task].setdefault(name, {}).update(self.closed_loop(policy, name, task, config.episodes))
+        metrics = {
+            "tasks": tasks,
+            "config": dataclasses.asdict(config),
+            "seed": config.seed,
+            "versions": versions(),
+            "seconds": self.seconds,
+            "command": shlex.join(["python", "examples/dagger.py", *sys.argv[1:]]),
+        }
+        _write_json(self.out / "metrics.json", metrics)
+        return metrics
+
+    def closed_loop(self, policy: Any, name: str, task: str, episodes: int) -> dict[str, Any]:
+        """Scores of `trainers.evaluate`, kept on disk; "episodes" is their number."""
+        path = self.out / "parts" / "closed_loop" / f"{name}-{task}.json"
+        known = _read_json(path)
+        if known is None:
+            config = self.config
+            result = trainers.evaluate(
+                policy,
+                task,
+                episodes=episodes,
+                seconds=config.episode_s,
+                seed=config.seed + 1,
+                n_jobs=config.n_envs,
+                progress=True,
+                **(config.env_kwargs if policy == "expert" else {}),
+            )
+            known = json_ready(result.as_dict() | {"learner": name})
+            _write_json(path, known)
+        kept = {key: value for key, value in known.items() if key not in ("task", "learner", "episodes", "seconds")}
+        return kept | {"episodes": len(known["episodes"])}
+
+    # -- Pictures ------------------------------------------------------------------------------------------------------
+
+    def pictures(self, policy: Any, held_out: trainers.Demonstrations) -> None:
+        """Joint targets against the expert's, and a video of the student in every gait where OpenGL is to be had."""
+        figure = trainers.joint_target_figure(policy, held_out)
+        figure.savefig(self.out / "joint_targets.png", dpi=120)
+        trainers.log_figure(self.logger, "joint_targets", figure)
+        if NO_GL:
+            print(f"no videos: {NO_GL}")
+            return
+        frames = {}
+        try:
+            with self.stage("videos"):
+                for task in tqdm(self.config.tasks, "videos", unit="gait"):
+                    command = (0.8 * TASKS[task].command_range[0], 0.0, 0.0)
+                    frames[task] = trainers.record_frames(policy, task, self.config.video_s, command)
+                    trainers.save_gif(frames[task], self.out / f"{task}.gif")
+        except RenderingError as error:
+            print(f"no videos: {error}")
+            return
+        trainers.save_gif(trainers.tile(frames), self.out / "gaits.gif")
+
+    # -- Housekeeping --------------------------------------------------------------------------------------------------
+
+    @contextmanager
+    def stage(self, name: str) -> Any:
+        """Add the wall time of a stage to what earlier, interrupted runs took for it."""
+        start = time.monotonic()
+        try:
+            yield
+        finally:
+            self.seconds[name] = round(self.seconds.get(name, 0.0) + time.monotonic() - start, 1)
+            _write_json(self._times_path, self.seconds)
+
+    def _claim(self) -> None:
+        path = self.out / "config.json"
+        settings = json_ready(dataclasses.asdict(self.config))
+        settings.pop("n_envs")
+        known = _read_json(path)
+        if known is None:
+            _write_json(path, settings)
+        elif known != settings:
+            changed = sorted(name for name in settings if known.get(name) != settings[name])
+            raise Go1Error(f"{self.out} holds a run with other settings ({', '.join(changed)}); choose another --out")
+
+
+def _read_json(path: Path) -> Any:
+    return json.loads(path.read_text()) if path.is_file() else None
+
+
+def _write_json(path: Path, value: Any) -> None:
+    text = json.dumps(json_ready(value), indent=1)
+    write_atomically(path, lambda file: file.write(text.encode()))
+
+
+def main(arguments: list[str] | None = None, announce: Callable[[str], None] = print) -> int:
+    """Run the job from the command line; returns the exit status."""
+    config, folder = parse(arguments)
+    out = Path(folder) if folder else Path("runs") / time.strftime("%Y-%m-%d_%H-%M-%S")
+    try:
+        metrics = Job(config, out).run()
+    except KeyboardInterrupt:
+        announce(f"\ninterrupted; what is done is kept, go on with: --out {out}")
+        return 130
+    except Go1Error as error:
+        announce(f"error: {error}")
+        return 2
+    table = trainers.results_table(metrics)
+    (out / "table.md").write_text(table + "\n")
+    announce(f"\n{table}\n\nresults in {out}; watch the training with: tensorboard --logdir {out / 'tensorboard'}")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

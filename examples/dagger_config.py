@@ -1,0 +1,173 @@
+"""Settings of the main job: presets, command line, and their check."""
+
+import argparse
+import dataclasses
+import os
+from typing import Any
+
+from go1_mtl_gym import TASKS, InvalidInputError
+from go1_mtl_gym.observation import CHANNELS
+from trainers import BCConfig, DAggerConfig
+
+
+@dataclasses.dataclass(frozen=True)
+class JobConfig:
+    """What the main job does; all durations are seconds of robot time per task.
+
+    Attributes:
+        preset: name of the preset that the rest started from.
+        tasks: which gaits, in head order.
+        rounds: DAgger rounds.
+        seed: of everything random.
+        n_envs: worker processes.
+        device: of the training, "cpu" or "cuda".
+        channels: optional parts of the observation.
+        history: proprioceptive frames in the observation.
+        control_hz: rate of the policy [Hz].
+        clean_s, perturbed_s, held_out_s: demonstrations: undisturbed, disturbed, and undisturbed for the R2.
+        shard_s: length of a shard, which begins with a standing start.
+        dagger_s: recorded in each DAgger round.
+        width: units of each hidden layer.
+        normalization: of inputs and outputs, see `trainers.MultiHeadPolicy`.
+        batch_size: rows per gradient step.
+        clone_steps, round_steps: gradient steps of cloning and of each round.
+        episodes, episode_s: of the closed-loop evaluation, per task and learner.
+        round_episodes: episodes per task after each DAgger round.
+        video_s: length of the videos.
+
+    Raises:
+        InvalidInputError: if a setting cannot be.
+    """
+
+    preset: str = "default"
+    tasks: tuple[str, ...] = tuple(TASKS)
+    rounds: int = 2
+    seed: int = 0
+    n_envs: int = os.cpu_count() or 1
+    device: str = "cpu"
+    channels: tuple[str, ...] = ("command", "phase", "last_action")
+    history: int = 1
+    control_hz: int = 50
+    clean_s: float = 60.0
+    perturbed_s: float = 240.0
+    held_out_s: float = 60.0
+    shard_s: float = 15.0
+    dagger_s: float = 60.0
+    width: int = 256
+    normalization: str = "mean_std"
+    batch_size: int = 1024
+    clone_steps: int = 6000
+    round_steps: int = 2500
+    episodes: int = 20
+    episode_s: float = 20.0
+    round_episodes: int = 4
+    video_s: float = 4.0
+
+    def __post_init__(self) -> None:
+        for name in ("tasks", "channels"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+        unknown = [name for name in self.tasks if name not in TASKS]
+        if unknown or not self.tasks:
+            raise InvalidInputError(f"tasks must be some of {', '.join(TASKS)}; got {self.tasks}")
+        if self.rounds < 0 or self.n_envs < 1 or self.seed < 0:
+            raise InvalidInputError(f"rounds and seed must be >= 0 and n_envs >= 1, got {self}")
+
+    @property
+    def env_kwargs(self) -> dict[str, Any]:
+        """Of the environments that demonstrations are collected in and students act in."""
+        return {
+            "tasks": self.tasks,
+            "channels": self.channels,
+            "history": self.history,
+            "control_hz": self.control_hz,
+            "kp": 50.0,
+            "kd": 2.0,
+        }
+
+    @property
+    def literal_env_kwargs(self) -> dict[str, Any]:
+        """Of the paper-literal student: the 34 numbers and the task id."""
+        return self.env_kwargs | {"channels": (), "history": 1}
+
+    @property
+    def bc(self) -> BCConfig:
+        """How to clone."""
+        return BCConfig(steps=self.clone_steps, batch_size=self.batch_size, seed=self.seed)
+
+    @property
+    def round_bc(self) -> BCConfig:
+        """How to train in a DAgger round."""
+        return dataclasses.replace(self.bc, steps=self.round_steps, learning_rate=1e-3)
+
+    @property
+    def dagger(self) -> DAggerConfig:
+        """How to collect a DAgger round."""
+        return DAggerConfig(seconds_per_task=self.dagger_s, seed=self.seed)
+
+
+PRESETS: dict[str, dict[str, Any]] = {
+    "default": {},
+    "smoke": {
+        "rounds": 1,
+        "clean_s": 3.0,
+        "perturbed_s": 6.0,
+        "held_out_s": 3.0,
+        "shard_s": 3.0,
+        "dagger_s": 2.0,
+        "width": 64,
+        "batch_size": 256,
+        "clone_steps": 300,
+        "round_steps": 100,
+        "episodes": 2,
+        "episode_s": 3.0,
+        "round_episodes": 1,
+        "video_s": 1.0,
+    },
+    # arXiv 2505.08574: 20 commands of 30 s per gait at 1 kHz, clean; min-max scaling; 2560 units; no DAgger.
+    "paper": {
+        "rounds": 0,
+        "channels": (),
+        "control_hz": 1000,
+        "clean_s": 600.0,
+        "perturbed_s": 0.0,
+        "held_out_s": 60.0,
+        "shard_s": 30.0,
+        "width": 2560,
+        "normalization": "min_max",
+        "clone_steps": 30_000,
+        "episodes": 5,
+    },
+}
+
+
+def parse(arguments: list[str] | None = None) -> tuple[JobConfig, str | None]:
+    """Read the command line.
+
+    Returns:
+        The settings, and the output folder (None: choose one).
+    """
+    parser = argparse.ArgumentParser(
+        description="Teach one network several gaits of a Go1 from an MPC expert, and measure how well it moves.",
+        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+    )
+    add = parser.add_argument
+    add("--preset", choices=tuple(PRESETS), default="default", help="smoke: 2 minutes; default: 15; paper: a day")
+    add("--out", help="folder of the results; an interrupted run goes on in the same one (default: runs/<date>)")
+    add("--tasks", nargs="+", choices=tuple(TASKS), default=list(TASKS), help="gaits, in head order")
+    add("--rounds", type=int, default=None, help="DAgger rounds; the preset's if not given")
+    add("--seed", type=int, default=0, help="of everything random")
+    add("--n-envs", type=int, default=os.cpu_count() or 1, help="worker processes")
+    add("--device", default="cpu", help="of the training: cpu or cuda")
+    add(
+        "--channels",
+        nargs="*",
+        choices=tuple(CHANNELS),
+        default=None,
+        help="parts of the observation; the preset's if not given",
+    )
+    add("--history", type=int, default=1, help="proprioceptive frames in the observation")
+    add("--control-hz", type=int, default=None, help="rate of the policy; the preset's if not given")
+    given = vars(parser.parse_args(arguments))
+    out = given.pop("out")
+    settings = PRESETS[given["preset"]] | {name: value for name, value in given.items() if value is not None}
+    return JobConfig(**settings), out

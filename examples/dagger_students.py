@@ -1,0 +1,47 @@
+"""The students of the main job: making one, and training the two baselines in processes of their own."""
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import torch
+from dagger_config import JobConfig
+
+import trainers
+
+
+def new_policy(config: JobConfig, env_kwargs: dict[str, Any], pooled: bool = False) -> trainers.MultiHeadPolicy:
+    """An untrained student for the environments that `env_kwargs` describe."""
+    env = trainers.make_env(config.tasks[0], **env_kwargs)
+    policy = trainers.MultiHeadPolicy(
+        env.observation_space,
+        env.action_space,
+        width=config.width,
+        n_tasks=len(config.tasks),
+        pooled=pooled,
+        normalization=config.normalization,
+        env_kwargs=env_kwargs,
+        seed=config.seed,
+    )
+    env.close()
+    return policy.to(torch.device(config.device))
+
+
+def train_baseline(config: JobConfig, name: str, out: Path, side_by_side: int) -> None:
+    """Train "pooled" or "paper_literal" on all rows of a run and save it there.
+
+    Args:
+        config: of the run.
+        name: which baseline.
+        out: folder of the run.
+        side_by_side: how many are trained at once; each gets its share of the cores.
+    """
+    if side_by_side > 1:
+        torch.set_num_threads(max(1, config.n_envs // side_by_side))
+    rows = trainers.Demonstrations.load(out / "parts" / "all_rows.npz")
+    literal = name == "paper_literal"
+    policy = new_policy(config, config.literal_env_kwargs if literal else config.env_kwargs, pooled=name == "pooled")
+    steps = config.clone_steps + config.rounds * config.round_steps
+    own = rows.proprioceptive() if literal else rows
+    trainers.train_bc(policy, own, dataclasses.replace(config.bc, steps=steps), progress=side_by_side == 1)
+    policy.save(out / "parts" / f"{name}.zip")

@@ -1,0 +1,168 @@
+"""Noise, kicks and changing commands, and labels that stay clean under them."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from experts import NMPCExpert
+from go1_mtl_gym import PerturbationWrapper, robot
+from go1_mtl_gym.env import Go1Env
+from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.perturbation import NOISE_CORRELATION_S
+
+QUIET = {"noise_rad": 0.0, "kick": 0.0, "command_interval": None}
+
+
+def wrapped(**kwargs) -> PerturbationWrapper:
+    return PerturbationWrapper(Go1Env("trot"), **(QUIET | kwargs))
+
+
+def home(env: PerturbationWrapper) -> np.ndarray:
+    return env.unwrapped.action_map.from_radians(robot.HOME_POSE).astype(np.float32)
+
+
+def test_without_disturbances_it_is_the_environment():
+    env, bare = wrapped(), Go1Env("trot")
+    np.testing.assert_array_equal(env.reset(seed=0)[0], bare.reset(seed=0)[0])
+    for _ in range(20):
+        (a, *_, info), (b, *_) = env.step(home(env)), bare.step(home(env))
+        np.testing.assert_array_equal(a, b)
+        np.testing.assert_array_equal(info["executed_action"], home(env))
+
+
+def test_one_seed_gives_the_same_disturbances_and_another_others():
+    runs = []
+    for seed in (1, 1, 2):
+        env = PerturbationWrapper(Go1Env("trot"), kick_interval=0.1, command_interval=(0.1, 0.3))
+        env.reset(seed=seed, options={"command": (0.1, 0, 0)})
+        steps = [env.step(home(env)) for _ in range(60)]
+        runs.append([np.concatenate([step[0], step[4]["executed_action"], step[4]["command"]]) for step in steps])
+    np.testing.assert_array_equal(runs[0], runs[1])
+    assert (np.array(runs[0])[:, 38:50] != np.array(runs[2])[:, 38:50]).all()
+
+
+def test_noise_is_autoregressive_with_a_sigma_drawn_per_episode():
+    env = wrapped(noise_rad=0.06)
+    env.reset(seed=0)
+    sigmas, lags = [], []
+    for _ in range(60):
+        env.reset()
+        env.unwrapped.simulation.step = lambda target, steps: None  # the noise does not depend on the physics
+        noise = np.array([env.step(home(env))[4]["executed_action"] for _ in range(150)]) - home(env)
+        noise *= env.unwrapped.action_map.half_range
+        sigmas.append(noise.std())
+        lags.append(np.mean(noise[1:] * noise[:-1]) / np.mean(noise**2))
+        assert np.ptp(noise.std(axis=0)) < 1.2 * noise.std(), "the same in radians for every joint"
+        del env.unwrapped.simulation.step
+    assert max(sigmas) < 0.06 * 1.15 and min(sigmas) < 0.01
+    assert np.mean(sigmas) == pytest.approx(0.03, abs=0.008)  # uniform in (0, .06)
+    assert np.mean(lags) == pytest.approx(np.exp(-0.02 / NOISE_CORRELATION_S), abs=0.03)
+
+
+def kicks(env: PerturbationWrapper, steps: int, monkeypatch) -> np.ndarray:
+    """Every velocity passed to `push` in a run, shape (n, 3)."""
+    pushes: list[np.ndarray] = []
+    monkeypatch.setattr(env.unwrapped, "push", lambda delta: pushes.append(np.array(delta)))
+    monkeypatch.setattr(env.unwrapped.simulation, "step", lambda target, steps: None)
+    for _ in range(steps):
+        env.step(home(env))
+    return np.array(pushes)
+
+
+def test_kicks_are_uniform_in_a_disc_and_come_at_the_mean_interval(monkeypatch):
+    env = wrapped(kick=0.2, kick_interval=0.5)
+    env.reset(seed=0)
+    pushed = kicks(env, 10_000, monkeypatch)  # 200 s
+    assert len(pushed) == pytest.approx(200 / 0.51, rel=0.2)  # each interval is rounded up to a step of .02 s
+    size = np.linalg.norm(pushed[:, :2], axis=1)
+    assert size.max() <= 0.2 and not pushed[:, 2].any()
+    assert np.mean(size**2) == pytest.approx(0.2**2 / 2, rel=0.15)
+    assert np.abs(pushed.mean(axis=0)).max() < 4 * 0.1 / np.sqrt(len(pushed))
+
+
+def test_a_kick_changes_the_velocity_of_the_trunk_by_at_most_its_size():
+    env = wrapped(kick=0.3, kick_interval=0.05)
+    env.reset(seed=0)
+    data, changes = env.unwrapped.simulation.data, []
+    push = env.unwrapped.simulation.push
+
+    def watched(delta):
+        before = data.qvel.copy()
+        push(delta)
+        changes.append(data.qvel - before)
+
+    env.unwrapped.simulation.push = watched
+    for _ in range(50):
+        env.step(home(env))
+    changes = np.array(changes)
+    assert len(changes) > 10 and (np.linalg.norm(changes[:, :3], axis=1) <= 0.3 + 1e-12).all()
+    assert np.abs(changes[:, :2]).max() > 0.1 and not changes[:, 3:].any()
+
+
+def test_commands_change_within_their_interval_and_range():
+    env = wrapped(command_interval=(0.2, 0.4))
+    _, info = env.reset(seed=0)
+    changed, last = [], info["command"]
+    for step in range(1, 301):
+        *_, info = env.step(home(env))
+        if (info["command"] != last).any():
+            changed.append(step * 0.02)
+            last = info["command"]
+            assert (np.abs(last) <= env.unwrapped.task.command_range).all()
+    gaps = np.diff([0.0, *changed])
+    assert len(gaps) > 14 and gaps.min() >= 0.2 - 1e-9 and gaps.max() <= 0.42 + 1e-9
+
+
+def test_labels_are_the_experts_answer_for_the_true_state():
+    env = PerturbationWrapper(Go1Env("trot"), noise_rad=0.06, kick=0.2, kick_interval=0.1)
+    env.reset(seed=5)
+    for _ in range(8):
+        expert = NMPCExpert(env.unwrapped.gains)
+        expert.reset(env.unwrapped.state)
+        label = env.unwrapped.expert_action()
+        expected = env.unwrapped.action_map.from_radians(expert.action(dataclasses.replace(env.unwrapped.state)))
+        np.testing.assert_array_equal(label, expected.astype(np.float32))
+        *_, info = env.step(label)
+        assert (info["executed_action"] != label).any()
+
+
+def test_executed_actions_stay_in_the_action_space():
+    env = PerturbationWrapper(Go1Env("trot"), noise_rad=1.0)
+    env.reset(seed=0)
+    executed = env.step(np.ones(12, np.float32))[4]["executed_action"]
+    assert env.action_space.contains(executed) and (executed < 1).any() and (executed == 1).any()
+
+
+@pytest.mark.parametrize(
+    ("figures", "words"),
+    [
+        ({"noise_rad": -0.1}, r"noise_rad.*\[0, 1\].*-0.1"),
+        ({"kick": float("nan")}, "kick.*nan"),
+        ({"kick_interval": 0.0}, "kick_interval.*got 0"),
+        ({"command_interval": (2.0, 1.0)}, "command_interval.*shortest"),
+        ({"command_interval": (0.0, 1.0)}, "command_interval"),
+        ({"command_interval": (1.0,)}, r"command_interval.*shape \(2,\)"),
+        ({"command_interval": (1.0, float("inf"))}, "command_interval.*finite"),
+    ],
+)
+def test_impossible_figures_are_refused(figures, words):
+    with pytest.raises(InvalidInputError, match=words):
+        wrapped(**figures)
+
+
+def test_a_malformed_action_is_refused():
+    env = wrapped(noise_rad=0.05)
+    env.reset(seed=0)
+    for action in (np.full(12, np.nan), np.zeros((2, 12)), np.zeros(12)[:, None]):
+        with pytest.raises(InvalidInputError, match="action"):
+            env.step(action)
+
+
+@pytest.mark.xfail(strict=True, reason="the noise broadcasts an action of shape () or (1,) to 12 before the check")
+@pytest.mark.parametrize("action", [0.0, np.zeros(1)], ids=["scalar", "one"])
+def test_an_action_that_would_broadcast_is_refused(action):
+    env = wrapped()
+    env.reset(seed=0)
+    with pytest.raises(InvalidInputError, match="action"):
+        env.step(action)

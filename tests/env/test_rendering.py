@@ -1,0 +1,134 @@
+"""Pictures: their shape, what is drawn into them, and what happens where none can be drawn."""
+
+import os
+import subprocess
+import sys
+
+import mujoco
+import numpy as np
+import pytest
+
+from go1_mtl_gym import robot
+from go1_mtl_gym.env import Go1Env
+from go1_mtl_gym.rendering import CONTACT_COLOUR, annotate
+
+
+@pytest.fixture
+def env():
+    env = Go1Env("trot", render_mode="rgb_array", width=160, height=120)
+    env.reset(seed=0, options={"command": (0.0, 0.0, 0.0)})
+    yield env
+    env.close()
+
+
+@pytest.mark.gl
+def test_picture_is_an_rgb_array_of_the_size_asked_for(env):
+    picture = env.render()
+    assert picture.shape == (120, 160, 3) and picture.dtype == np.uint8
+    assert picture.std() > 5 and len(np.unique(picture.reshape(-1, 3), axis=0)) > 100
+    np.testing.assert_array_equal(picture, env.render())
+
+
+@pytest.mark.gl
+def test_pictures_follow_the_robot(env):
+    before = env.render()
+    for _ in range(10):
+        env.step(env.action_map.from_radians(robot.HOME_POSE + 0.3))
+    assert (env.render() != before).any()
+
+
+@pytest.mark.gl
+def test_a_command_draws_a_green_arrow(env):
+    before = env.render().astype(int)
+    env._filtered_command[:] = [0.6, 0.0, 0.0]
+    after = env.render().astype(int)
+    changed = (after != before).any(axis=2)
+    assert 10 < changed.sum() < changed.size / 4
+    red, green, blue = (after - before)[changed].mean(axis=0)
+    assert green > red and green > blue
+
+
+@pytest.mark.gl
+def test_contacts_draw_discs_under_the_feet_on_the_ground(env):
+    for _ in range(20):
+        env.step(env.action_map.from_radians(robot.HOME_POSE))
+    assert env.state.contacts.all()
+    with_contacts = env.render().astype(int)
+    touch = [env.simulation.model.sensor(f"{leg}_touch").adr[0] for leg in robot.LEGS]
+    env.simulation.data.sensordata[touch] = 0.0
+    without = env.render().astype(int)
+    changed = (with_contacts != without).any(axis=2)
+    assert 5 < changed.sum() < changed.size / 4
+    red, _, blue = (with_contacts - without)[changed].mean(axis=0)
+    assert red > blue, "the discs are orange"
+
+
+@pytest.mark.gl
+def test_the_camera_tracks_a_robot_far_away(env):
+    near = env.render().astype(int)
+    env.simulation.data.qpos[0] += 50.0
+    env.simulation.step(env.state.q, 1)
+    far = env.render().astype(int)
+    assert np.abs(far - near).mean() < 25 and far.std() > 5
+
+
+def test_annotations_stop_at_the_capacity_of_the_scene():
+    env = Go1Env("trot")
+    env.reset(seed=0, options={"command": (0.5, 0, 0)})
+    home = env.action_map.from_radians(robot.HOME_POSE)
+    for _ in range(100):
+        env.step(home)
+    for capacity, expected in ((100, 5), (3, 3), (0, 0)):
+        scene = mujoco.MjvScene(env.simulation.model, capacity)
+        annotate(scene, env.simulation, env.state)
+        assert scene.ngeom == expected, "four discs and the command; the robot stands still"
+        if expected:
+            np.testing.assert_allclose(scene.geoms[0].rgba, CONTACT_COLOUR, atol=1e-6)
+            np.testing.assert_allclose(scene.geoms[0].pos[:2], env.simulation.feet_w[0, :2], atol=1e-5)
+
+
+def test_render_without_a_mode_warns_and_draws_nothing():
+    env = Go1Env("trot")
+    env.reset(seed=0)
+    with pytest.warns(UserWarning, match="without a render_mode"):
+        assert env.render() is None
+    env.close(), env.close()
+
+
+def test_render_fps_is_the_control_rate_up_to_fifty():
+    assert Go1Env("trot").metadata["render_fps"] == 50
+    assert Go1Env("trot", control_hz=200).metadata["render_fps"] == 50
+    assert Go1Env.metadata["render_modes"] == ["human", "rgb_array"]
+
+
+_WITHOUT_A_DISPLAY = """
+from go1_mtl_gym.env import Go1Env
+from go1_mtl_gym.rendering import RenderingError
+try:
+    env = Go1Env("trot", render_mode="{mode}")
+    env.reset(seed=0)
+    env.render()
+except RenderingError as error:
+    print("refused:", error)
+"""
+
+
+def refusal(mode: str, gl: str) -> str:
+    hidden = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    done = subprocess.run(
+        [sys.executable, "-c", _WITHOUT_A_DISPLAY.format(mode=mode)],
+        env=hidden | {"MUJOCO_GL": gl, "PYTHONPATH": os.pathsep.join(sys.path)},
+        capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+    return done.stdout
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems always have a display")
+def test_off_screen_without_open_gl_says_what_to_try():
+    assert "MUJOCO_GL=egl" in refusal("rgb_array", "disable")
+
+
+@pytest.mark.xfail(strict=True, reason="mujoco.viewer ends the whole process where GLFW finds no display")
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems always have a display")
+def test_a_window_without_a_display_says_what_to_do_instead():
+    assert "rgb_array" in refusal("human", "egl")
