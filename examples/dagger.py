@@ -14,7 +14,7 @@ import shlex
 import sys
 import time
 from collections.abc import Callable
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -130,13 +130,16 @@ class Job:
                 progress=True,
             )
             with self.stage("dagger"):
+                if trainer.round_num == 0:
+                    self._watch(policy, held_out, 0)
                 while trainer.round_num < config.rounds:
                     rows = trainer.collect_round()
                     train = trainers.Demonstrations.concatenate([train, rows])
                     trainer.train_round()
                     self._watch(trainer.policy, held_out, trainer.round_num)
         finally:
-            venv.close()
+            with suppress(EOFError, OSError):  # after Ctrl-C its processes may be gone already
+                venv.close()
         self._everything(train)
         return trainer.policy
 

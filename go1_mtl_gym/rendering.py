@@ -1,5 +1,7 @@
 """Pictures of the robot, with its foot contacts and its command drawn in: off screen or in a window."""
 
+import os
+import sys
 from typing import Protocol
 
 import mujoco
@@ -105,6 +107,9 @@ class Viewer:
     """
 
     def __init__(self, simulation: Simulation, width: int, height: int) -> None:
+        # without a display GLFW ends the whole process instead of raising
+        if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+            raise RenderingError('cannot open a window: there is no display; use render_mode="rgb_array"')
         import mujoco.viewer
 
         self._simulation = simulation

@@ -21,7 +21,17 @@ if TYPE_CHECKING:
 
 FORMAT = "go1-mtl-gym policy"
 FORMAT_VERSION = 1
-PACKAGES = ("go1-mtl-gym", "numpy", "torch", "gymnasium", "stable-baselines3", "imitation", "mujoco")
+PACKAGES = (
+    "go1-mtl-gym",
+    "numpy",
+    "mujoco",
+    "gymnasium",
+    "pin",
+    "osqp",
+    "torch",
+    "stable-baselines3",
+    "imitation",
+)
 
 
 class CheckpointError(InvalidInputError):

@@ -36,8 +36,8 @@ class EpisodeRecord:
         fallen: whether it fell.
         velocity_error: `trainers.metrics.tracking_error` after the first 2 s [m/s]; NaN if it fell too early to tell.
         yaw_rate_error: likewise [rad/s].
-        step_rate: touchdowns per second of each leg after the first 2 s [1/s], each after at least half a planned swing in
-            the air; NaN if it fell within them.
+        step_rate: touchdowns per second of each leg after the first 2 s [1/s], each after at least half a planned swing
+            in the air; NaN if it fell within them.
         success: survived, velocity error <= 0.15 m/s, and every leg's rate within 25 % of 1 / gait period.
     """
 

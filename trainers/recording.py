@@ -155,7 +155,7 @@ def save_gif(frames: np.ndarray, path: str | PathLike[str], fps: int = 25) -> No
     if not 1 <= fps <= MAX_FPS:
         raise InvalidInputError(f"fps must be from 1 to {MAX_FPS}, got {fps}")
     some = frames[np.unique(np.linspace(0, len(frames) - 1, PALETTE_FRAMES).round().astype(int))]
-    palette = Image.fromarray(np.concatenate(some)).quantize(COLOURS, method=Image.Quantize.MEDIANCUT)
+    palette = Image.fromarray(np.concatenate(some)).quantize(COLOURS, method=Image.Quantize.FASTOCTREE)
     images = [Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
     how = {"save_all": True, "append_images": images[1:], "duration": 10 * round(100 / fps), "loop": 0}
     write_atomically(path, lambda file: images[0].save(file, format="GIF", optimize=False, **how))

@@ -14,9 +14,9 @@ LEARNERS = {
 }
 """Name in ``metrics.json`` -> name in a table, in the order of the rows."""
 RESULT_COLUMNS = {
-    "MSE [rad²]": ("mse", ".6f"),
+    "MSE [rad^2]": ("mse", ".6f"),
     "MAE [rad]": ("mae", ".4f"),
-    "R²": ("r2", ".4f"),
+    "R2": ("r2", ".4f"),
     "success": ("success_rate", "share"),
     "survival": ("survival_rate", "share"),
     "velocity error [m/s]": ("velocity_error", ".3f"),
@@ -60,8 +60,8 @@ def results_table(metrics: Mapping[str, Any]) -> str:
 def paper_table(metrics: Mapping[str, Any]) -> str:
     """R2 of the multi-head student and the pooled baseline here, and of their counterparts in arXiv 2505.08574.
 
-    The settings differ (other expert, gains, rates, commands and inputs), so this says how well each network fits its own
-    expert, not which one is better.
+    The settings differ (other expert, gains, rates, commands and inputs), so this says how well each network fits its
+    own expert, not which one is better.
 
     Args:
         metrics: what ``metrics.json`` holds.

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from experts.model import RobotModel
-from experts.nominal import SAMPLES, NominalMotion, nominal_motion
+from experts.nominal import MIN_LOAD, SAMPLES, NominalMotion, nominal_motion
 from go1_mtl_gym import GAITS, robot
 from go1_mtl_gym.gaits import Gait
 
@@ -19,10 +19,10 @@ def motion(gait: Gait) -> NominalMotion:
 @EVERY
 def test_feet_carry_the_weight_on_average_and_nothing_in_the_air(gait):
     load, stance = motion(gait).load, gait.stance(np.arange(SAMPLES) / SAMPLES)
-    assert load.sum(axis=1).mean() == pytest.approx(1.0, abs=1e-5)
+    assert load.sum(axis=1).mean() == pytest.approx(1.0, abs=2e-3)
     assert (load[~stance] == 0).all() and (load >= 0).all()
     supported = stance.any(axis=1)
-    np.testing.assert_allclose(load.sum(axis=1), np.where(supported, 1 / supported.mean(), 0), atol=1e-4)
+    np.testing.assert_allclose(load.sum(axis=1), np.where(supported, 1 / supported.mean(), 0), atol=2e-3)
 
 
 def test_jump_pushes_harder_to_make_up_for_its_flight():
@@ -104,8 +104,16 @@ def test_bound_lifts_its_nose_while_the_front_feet_push():
     assert np.median(change) < 0, "a positive pitch is nose down"
 
 
-def test_walk_stays_nearly_level():
-    assert np.abs(motion(GAITS["walk"]).position[:, :2]).max() < 0.06
+def test_walk_keeps_some_load_on_every_standing_foot_and_sways_for_it():
+    """By hand: on FL, RL, RR a level body would leave RL without load; the least load there makes it roll instead."""
+    nominal, stance = motion(GAITS["walk"]), GAITS["walk"].stance(np.arange(SAMPLES) / SAMPLES)
+    assert nominal.load[stance].min() >= MIN_LOAD - 1e-9 > 0
+    three = nominal.load_at(np.array([12 / SAMPLES]))[0]  # FR in the air
+    assert three[1] == 0 and three[2] == pytest.approx(MIN_LOAD, abs=1e-6)
+    moment = three @ robot.NOMINAL_FOOT_B
+    assert moment[1] > abs(moment[0]) and three[0] + three[3] == pytest.approx(1 - MIN_LOAD, abs=1e-5)
+    roll, pitch, _ = np.abs(nominal.position).max(axis=0)
+    assert pitch < 0.03 and pitch < roll < 0.25
 
 
 def test_inertia_scales_the_motion():
@@ -113,4 +121,4 @@ def test_inertia_scales_the_motion():
     light, heavy = nominal_motion(bound, 0.127, 0.394), nominal_motion(bound, 0.127, 2 * 0.394)
     np.testing.assert_allclose(heavy.position[:, 1], light.position[:, 1] / 2, atol=1e-12)
     inertia = np.diag(RobotModel().standing_inertia())
-    assert INERTIA == pytest.approx(tuple(inertia[:2]), abs=2e-3)
+    np.testing.assert_allclose(INERTIA, inertia[:2], atol=2e-3)

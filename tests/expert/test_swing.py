@@ -63,7 +63,7 @@ def arc(state, dynamics: Dynamics, press=0.003) -> tuple[np.ndarray, np.ndarray,
 def test_velocity_and_feed_forward_are_derivatives_of_the_position(standing, model, gait):
     step = 1e-4
     for leg in range(4):
-        for s in (0.1, 0.4, 0.55, 0.9):
+        for s in (0.1, 0.4, 0.55, 0.8, 0.95):
             phase = gait.duty + s * (1 - gait.duty) - gait.offsets[leg]
             before, now, after = (arc(*moving(standing, model, gait, t, phase)) for t in (-step, 0.0, step))
             numeric = (after[0] - before[0])[leg] / (2 * step)
@@ -75,7 +75,7 @@ def test_velocity_and_feed_forward_are_derivatives_of_the_position(standing, mod
 def test_arc_leads_from_one_stride_behind_to_the_foothold(standing, model, gait):
     leg, rule = 0, FootholdRule()
     ends = {}
-    for s in (1e-9, 0.5, 1 - 1e-9):
+    for s in (1e-9, 0.45, 0.9 - 1e-9):  # the last tenth of the swing is spent waiting on the ground
         phase = gait.duty + s * (1 - gait.duty) - gait.offsets[leg]
         state, dynamics = moving(standing, model, gait, 0.0, phase)
         remaining = np.full(4, (1 - s) * gait.swing_s)
@@ -87,7 +87,17 @@ def test_arc_leads_from_one_stride_behind_to_the_foothold(standing, model, gait)
     np.testing.assert_allclose(touchdown[0], [0, 0, -0.003], atol=1e-6)
     assert middle[0][2] == pytest.approx(gait.swing_height - 0.003 / 4)
     np.testing.assert_allclose(lift_off[1], 0, atol=1e-6)
-    np.testing.assert_allclose(touchdown[1], [0, 0, -2 * 0.003 / gait.swing_s], atol=1e-6)
+    np.testing.assert_allclose(touchdown[1], [0, 0, -2 * 0.003 / (0.9 * gait.swing_s)], atol=1e-6)
+
+
+@EVERY
+def test_foot_waits_on_the_ground_at_the_end_of_the_swing(standing, model, gait):
+    for s in (0.9 + 1e-9, 0.95, 1 - 1e-9):
+        state, dynamics = moving(standing, model, gait, 0.0, gait.duty + s * (1 - gait.duty) - gait.offsets[0])
+        position, velocity, forward = arc(state, dynamics)
+        landing = FootholdRule().plan(state, dynamics.com_w, VELOCITY, np.full(4, (1 - s) * gait.swing_s))[0]
+        np.testing.assert_allclose(position[0], landing - [0, 0, 0.003], atol=1e-9)
+        assert not velocity[0].any() and not forward[0].any()
 
 
 def test_on_the_arc_the_answer_is_the_feed_forward(standing, model):
@@ -108,6 +118,6 @@ def test_off_the_arc_it_is_a_pd_law(standing, model):
 
 def test_feet_clear_the_ground_during_the_swing(standing, model):
     for gait in GAITS.values():
-        for s in np.linspace(0.05, 0.95, 10):
+        for s in np.linspace(0.05, 0.8, 10):
             state, dynamics = moving(standing, model, gait, 0.0, gait.duty + s * (1 - gait.duty) - gait.offsets[0])
             assert arc(state, dynamics)[0][0, 2] > robot.FOOT_RADIUS

@@ -1,0 +1,191 @@
+"""The expert as a function of the state: the same bits, no memory, symmetries, and what it does when things fail."""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+
+from experts import NMPCConfig, NMPCExpert
+from experts.mpc import Solution
+from go1_mtl_gym import robot
+from go1_mtl_gym.actuation import PDGains
+from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.state import RobotState
+
+PARTS = ["position_w", "quat_wxyz", "linear_velocity_w", "angular_velocity_b", "q", "v", "command"]
+
+
+def fresh(state: RobotState) -> NMPCExpert:
+    expert = NMPCExpert()
+    expert.reset(state)
+    return expert
+
+
+def displaced(state: RobotState, yaw: float, shift: np.ndarray) -> RobotState:
+    """The same robot elsewhere, facing elsewhere."""
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    turn, quat = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]]), np.empty(4)
+    mujoco.mju_mulQuat(quat, np.array([np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)]), state.quat_wxyz)
+    return replace(
+        state,
+        position_w=turn @ state.position_w + shift,
+        quat_wxyz=quat,
+        linear_velocity_w=turn @ state.linear_velocity_w,
+    )
+
+
+def test_asking_twice_gives_the_same_bits(expert, driven):
+    for state in driven.states:
+        np.testing.assert_array_equal(expert.action(state), expert.action(state))
+
+
+def test_what_was_asked_before_does_not_matter(driven):
+    expert = fresh(driven.states[0])
+    in_order = [expert.action(state) for state in driven.states]
+    backwards = [expert.action(state) for state in driven.states[::-1]][::-1]
+    np.testing.assert_array_equal(in_order, backwards)
+    np.testing.assert_array_equal(fresh(driven.states[-1]).action(driven.states[-1]), in_order[-1])
+
+
+def test_states_are_not_written_to(expert, driven):
+    state = driven.states[0]
+    kept = {name: getattr(state, name).copy() for name in PARTS}
+    expert.action(state)
+    for name, value in kept.items():
+        np.testing.assert_array_equal(getattr(state, name), value)
+
+
+@pytest.mark.parametrize("hold_s", [0.02, 0.001, 0.0])
+def test_action_aims_at_the_middle_of_the_hold(trotting, hold_s):
+    gains = PDGains(40.0, 1.5)
+    expert = NMPCExpert(gains, hold_s=hold_s)
+    for state in trotting.states:
+        torque, acceleration = expert.torque(state)
+        half = hold_s / 2
+        q_mid = state.q + half * state.v + half**2 / 2 * acceleration
+        v_mid = state.v + half * acceleration
+        by_hand = q_mid + (torque + 1.5 * v_mid) / 40.0
+        np.testing.assert_allclose(expert.action(state), by_hand, atol=1e-12)
+    if hold_s == 0.0:
+        np.testing.assert_allclose(by_hand, state.q + (torque + 1.5 * state.v) / 40.0, atol=1e-12)
+
+
+def test_torques_are_within_limits_and_swing_feet_get_no_force(expert, driven):
+    for state in driven.states:
+        torque, _ = expert.torque(state)
+        assert (np.abs(torque) <= robot.TORQUE_LIMIT).all()
+        forces = expert.forces(state, expert._model.dynamics(state))
+        in_air = state.gait.contact_schedule(state.phase, state.gait.period / 16, 1)[0] == 0
+        assert np.abs(forces[in_air]).max(initial=0) < 0.6
+
+
+@pytest.mark.parametrize("name", [*PARTS, "phase"])
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_a_state_that_is_not_finite_is_answered_with_the_home_pose(standing, name, bad):
+    expert = fresh(standing)
+    before = expert.action(standing)
+    value = bad if name == "phase" else np.r_[getattr(standing, name)[:-1], bad]
+    np.testing.assert_array_equal(expert.action(replace(standing, **{name: value})), robot.HOME_POSE)
+    assert (expert.counters.calls, expert.counters.bad_states, expert.counters.solver_failures) == (2, 1, 0)
+    np.testing.assert_array_equal(expert.action(standing), before)
+
+
+@pytest.mark.xfail(strict=True, reason="a huge state overflows: LinAlgError or NaN instead of an answer")
+@pytest.mark.parametrize("change", [{"position_w": np.full(3, 1e30)}, {"v": np.full(12, 1e200)}], ids=["far", "fast"])
+def test_a_state_that_is_finite_but_absurd_is_answered_too(standing, change):
+    with np.errstate(all="ignore"):
+        assert np.isfinite(fresh(standing).action(replace(standing, **change))).all()
+
+
+def test_a_failed_solve_falls_back_to_the_last_good_forces(standing, monkeypatch):
+    expert = fresh(standing)
+    dynamics = expert._model.dynamics(standing)
+    good = expert.forces(standing, dynamics)
+    failed = Solution(np.full((4, 3), np.nan), np.zeros((16, 12)), np.zeros((16, 12)), 500, solved=False, usable=False)
+    monkeypatch.setattr(expert._mpc, "solve", lambda *problem: failed)
+    np.testing.assert_array_equal(expert.forces(standing, dynamics), good)
+    assert np.isfinite(expert.action(standing)).all()
+    assert expert.counters.solver_failures == 2 and expert.counters.iterations > 1000
+    monkeypatch.undo()
+    np.testing.assert_array_equal(expert.action(standing), fresh(standing).action(standing))
+
+
+def test_a_first_solve_that_fails_shares_the_weight_evenly(standing, monkeypatch):
+    expert = fresh(standing)
+    failed = Solution(np.full((4, 3), np.nan), np.zeros((16, 12)), np.zeros((16, 12)), 500, solved=False, usable=False)
+    monkeypatch.setattr(expert._mpc, "solve", lambda *problem: failed)
+    forces = expert.forces(standing, expert._model.dynamics(standing))
+    np.testing.assert_allclose(forces, np.tile([0, 0, robot.MASS * 9.81 / 4], (4, 1)))
+    assert np.isfinite(expert.action(standing)).all()
+
+
+def test_inexact_solves_are_counted_and_used(standing, monkeypatch):
+    expert = fresh(standing)
+    forces = np.tile([0.0, 0.0, 31.0], (4, 1))
+    close = Solution(forces, np.zeros((16, 12)), np.zeros((16, 12)), 500, solved=False, usable=True)
+    monkeypatch.setattr(expert._mpc, "solve", lambda *problem: close)
+    np.testing.assert_array_equal(expert.forces(standing, expert._model.dynamics(standing)), forces)
+    assert (expert.counters.inexact_solves, expert.counters.solver_failures) == (1, 0)
+
+
+def test_reset_clears_the_counters(standing):
+    expert = fresh(standing)
+    expert.action(standing)
+    assert expert.counters.calls == 1 and expert.counters.iterations > 0
+    expert.reset(standing)
+    assert expert.counters.calls == expert.counters.iterations == 0
+
+
+@pytest.mark.parametrize(("yaw", "tolerance"), [(np.pi, 5e-3), (np.pi / 2, 5e-3), (-0.7, 0.05)])
+def test_where_the_robot_faces_does_not_matter(expert, driven, yaw, tolerance):
+    """Quarter turns map the friction pyramid to itself, up to the solver's tolerance; others turn its corners."""
+    for state in driven.states:
+        turned = displaced(state, yaw, np.zeros(3))
+        np.testing.assert_allclose(expert.action(turned), expert.action(state), atol=tolerance)
+
+
+@pytest.mark.parametrize(("distance", "tolerance"), [(0.5, 5e-3), (30.0, 1e-2)])
+def test_where_the_robot_stands_does_not_matter(expert, driven, distance, tolerance):
+    for state in driven.states:
+        moved = displaced(state, 0.0, np.array([distance, -distance, 0.0]))
+        np.testing.assert_allclose(expert.action(moved), expert.action(state), atol=tolerance)
+
+
+def mirrored(state: RobotState) -> RobotState:
+    """The mirror image in the plane y = 0, half a trot later, when the other diagonal does the same."""
+    flip = np.array([1.0, -1.0, 1.0])
+    joints = np.array([-1.0, 1.0, 1.0])
+    w, x, y, z = state.quat_wxyz
+    return replace(
+        state,
+        position_w=state.position_w * flip,
+        quat_wxyz=np.array([w, -x, y, -z]),
+        linear_velocity_w=state.linear_velocity_w * flip,
+        angular_velocity_b=-state.angular_velocity_b * flip,
+        q=mirrored_joints(state.q, joints),
+        v=mirrored_joints(state.v, joints),
+        contacts=state.contacts[[1, 0, 3, 2]],
+        phase=(state.phase + 0.5) % 1.0,
+        command=state.command * [1, -1, -1],
+    )
+
+
+def mirrored_joints(values: np.ndarray, signs: np.ndarray) -> np.ndarray:
+    return (values.reshape(4, 3)[[1, 0, 3, 2]] * signs).ravel()
+
+
+def test_a_trots_left_is_its_right(expert, trotting):
+    """Nearly: the trunk's centre of mass lies 2 mm off the middle."""
+    for state in trotting.states:
+        ours, theirs = expert.action(state), expert.action(mirrored(state))
+        np.testing.assert_allclose(mirrored_joints(theirs, np.array([-1.0, 1, 1])), ours, atol=0.06)
+        assert np.abs(theirs - ours).max() > 0.1, "the mirror image is another state"
+
+
+@pytest.mark.parametrize(
+    "make", [lambda: NMPCConfig(com_height=0.5), lambda: NMPCExpert(hold_s=1.0), lambda: NMPCExpert(hold_s=np.nan)]
+)
+def test_impossible_figures_are_refused(make):
+    with pytest.raises(InvalidInputError, match="com_height|hold_s"):
+        make()

@@ -1,0 +1,102 @@
+"""The examples as a visitor runs them: from the command line, in a folder of their own."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from go1_mtl_gym import TASKS
+
+ROOT = Path(__file__).parent.parent
+CLOSED_LOOP = {"survival_rate", "survival_s", "velocity_error", "step_rate", "success_rate"}
+ONE_STEP = {"mse", "mae", "r2", "r2_joint_mean"}
+
+
+def start(*arguments: str) -> subprocess.Popen:
+    command = [sys.executable, str(ROOT / "examples" / "dagger.py"), *arguments]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+    return subprocess.Popen(command, cwd=ROOT, start_new_session=True, **pipes)
+
+
+def finish(process: subprocess.Popen) -> str:
+    output, _ = process.communicate(timeout=600)
+    assert process.returncode == 0, output[-4000:]
+    return output
+
+
+@pytest.fixture(scope="module")
+def smoke(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """A smoke run that was interrupted by Ctrl-C after cloning and then taken up again."""
+    out = tmp_path_factory.mktemp("job") / "run"
+    arguments = ("--preset", "smoke", "--n-envs", "2", "--out", str(out))
+    process = start(*arguments)
+    deadline = time.monotonic() + 300
+    while not (out / "parts" / "cloned.zip").is_file():
+        assert process.poll() is None and time.monotonic() < deadline, process.communicate()[0][-4000:]
+        time.sleep(0.1)
+    time.sleep(1.0)
+    os.killpg(process.pid, signal.SIGINT)
+    output, _ = process.communicate(timeout=60)
+    assert process.returncode == 130, output[-4000:]
+    assert f"--out {out}" in output
+    shards = {path: path.stat().st_mtime_ns for path in (out / "demonstrations").iterdir()}
+    output = finish(start(*arguments))
+    assert shards == {path: path.stat().st_mtime_ns for path in (out / "demonstrations").iterdir()}
+    return out, output
+
+
+@pytest.mark.slow
+def test_smoke_writes_the_metrics_that_others_read(smoke):
+    out, _ = smoke
+    metrics = json.loads((out / "metrics.json").read_text())
+    assert list(metrics["tasks"]) == list(TASKS)
+    for learners in metrics["tasks"].values():
+        assert set(learners["expert"]) >= CLOSED_LOOP
+        for name in ("multi_head", "pooled", "paper_literal"):
+            assert set(learners[name]) >= CLOSED_LOOP | ONE_STEP
+        assert learners["expert"]["survival_rate"] == 1.0
+    assert metrics["seed"] == 0 and metrics["config"]["preset"] == "smoke"
+    assert {"demonstrations", "clone", "dagger", "baselines", "evaluation"} <= set(metrics["seconds"])
+    assert metrics["versions"]["mujoco"]
+
+
+@pytest.mark.slow
+def test_smoke_prints_one_table_per_gait_and_leaves_its_files(smoke):
+    out, output = smoke
+    assert all(task in output for task in TASKS) and "R2" in output
+    for name in ("policy.zip", "joint_targets.png", "table.md", "config.json"):
+        assert (out / name).stat().st_size > 0
+    assert list((out / "tensorboard").glob("events.*"))
+
+
+@pytest.mark.slow
+@pytest.mark.gl
+def test_smoke_films_every_gait(smoke):
+    out, _ = smoke
+    assert all((out / f"{name}.gif").stat().st_size > 10_000 for name in (*TASKS, "gaits"))
+
+
+@pytest.mark.slow
+def test_the_saved_policy_drives_its_environment(smoke):
+    import trainers
+
+    policy = trainers.load(smoke[0] / "policy.zip")
+    env = trainers.make_env("bound", **policy.env_kwargs)
+    obs, _ = env.reset(seed=0)
+    action, _ = policy.predict(obs, deterministic=True)
+    assert env.action_space.contains(action)
+
+
+@pytest.mark.slow
+def test_a_finished_run_is_not_repeated_and_other_settings_are_refused(smoke):
+    out, _ = smoke
+    before = (out / "policy.zip").stat().st_mtime_ns, (out / "metrics.json").read_text()
+    process = start("--preset", "smoke", "--n-envs", "2", "--out", str(out), "--seed", "1")
+    output, _ = process.communicate(timeout=120)
+    assert process.returncode == 2 and "other settings (seed)" in output
+    assert before == ((out / "policy.zip").stat().st_mtime_ns, (out / "metrics.json").read_text())
