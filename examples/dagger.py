@@ -153,11 +153,7 @@ class Job:
             task: self.closed_loop(policy, f"round-{round_num}", task, self.config.round_episodes)
             for task in self.config.tasks
         }
-        trainers.log_round(self.logger, round_num, offline=trainers.offline_metrics(policy, held_out))
-        for task, result in closed_loop.items():
-            for name in ("success_rate", "survival_rate", "velocity_error"):
-                self.logger.record(f"closed_loop/{name}/{task}", result[name])
-        self.logger.dump(round_num)
+        trainers.log_round(self.logger, round_num, closed_loop, trainers.offline_metrics(policy, held_out))
 
     def baselines(self) -> dict[str, Any]:
         """The pooled and the paper-literal student, on the same rows with as many gradient steps, side by side."""

@@ -119,7 +119,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "clone_steps": 300,
         "round_steps": 100,
         "episodes": 2,
-        "episode_s": 3.0,
+        "episode_s": 5.0,
         "round_episodes": 1,
         "video_s": 1.0,
     },

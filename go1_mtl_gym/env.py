@@ -3,7 +3,6 @@
 import copy
 from collections import deque
 from collections.abc import Callable, Sequence
-from importlib import import_module
 from typing import Any, ClassVar
 
 import gymnasium
@@ -13,16 +12,17 @@ from gymnasium.spaces import Box
 
 from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import ActionMap, PDGains
+from go1_mtl_gym.episode import Episode
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.observation import PROPRIOCEPTION, ObservationLayout, SensorNoise
+from go1_mtl_gym.expert_hook import DEFAULT_EXPERT, load_expert
+from go1_mtl_gym.observation import ObservationLayout, SensorNoise
+from go1_mtl_gym.observer import Observer
 from go1_mtl_gym.rewards import reward_terms
 from go1_mtl_gym.simulation import PHYSICS_HZ, Simulation
 from go1_mtl_gym.state import RobotState
-from go1_mtl_gym.tasks import TASKS, Task
+from go1_mtl_gym.tasks import TASKS, Task, check_task_names
 from go1_mtl_gym.validation import finite_vector, number_in, one_of
 
-COMMAND_FILTER_S = 0.2
-"""Time constant of the low-pass between a command and what expert and student see of it [s]."""
 FALLEN_HEIGHT = 0.14
 """A trunk lower than this has fallen [m]."""
 FALLEN_COSINE = 0.5
@@ -84,13 +84,13 @@ class Go1Env(gymnasium.Env):
         kd: float = 2.0,
         noise: SensorNoise | bool | None = None,
         episode_s: float = 30.0,
-        expert: str | Callable[..., Any] = "experts.nmpc:NMPCExpert",
+        expert: str | Callable[..., Any] = DEFAULT_EXPERT,
         render_mode: str | None = None,
         width: int = 640,
         height: int = 480,
     ) -> None:
         self._arguments = {name: value for name, value in locals().items() if name not in ("self", "__class__")}
-        self.tasks = _checked_tasks(tasks)
+        self.tasks = check_task_names(tasks)
         if task is not None:
             one_of(task, self.tasks, "task")
         number_in(control_hz, 50, PHYSICS_HZ, "control_hz")
@@ -109,12 +109,12 @@ class Go1Env(gymnasium.Env):
         self.action_space = Box(-1.0, 1.0, (12,), dtype=np.float32)
         self.render_mode = render_mode
         self.metadata = self.metadata | {"render_fps": min(self.control_hz, 50)}
-        self._noise = SensorNoise() if noise is True else (noise or None)
+        self._observer = Observer(self.layout, SensorNoise() if noise is True else (noise or None), self.tasks)
         self._episode_steps = round(number_in(episode_s, 1.0 / control_hz, 1e6, "episode_s") * control_hz)
         self._simulation = Simulation(self.gains)
         self._expert: Any = None
         self._renderer: Any = None
-        self._ready = False
+        self._episode: Episode | None = None
 
     # -- Gymnasium ---------------------------------------------------------------------------------------------------
 
@@ -137,25 +137,24 @@ class Go1Env(gymnasium.Env):
         if options.get("command") is not None:
             TASKS[options.get("task") or self._arguments["task"] or self.tasks[0]].check_command(options["command"])
         super().reset(seed=seed)
-        name = options.get("task") or self._arguments["task"] or str(self.np_random.choice(self.tasks))
-        self._task = TASKS[name]
+        task = TASKS[options.get("task") or self._arguments["task"] or str(self.np_random.choice(self.tasks))]
+        drawn = task.draw_command(self.np_random)
         command = options.get("command")
-        drawn = self._task.draw_command(self.np_random)
-        self._command = drawn if command is None else self._task.check_command(command)
-        self._filtered_command = np.zeros(3)
-        self._phase = 0.0
-        self._steps = 0
+        self._episode = Episode(
+            task=task,
+            command=drawn if command is None else task.check_command(command),
+            last_action=self.action_map.from_radians(robot.HOME_POSE),
+            older_frames=deque(maxlen=self.layout.history - 1),
+        )
         joint_noise = self.np_random.uniform(-RESET_JOINT_NOISE, RESET_JOINT_NOISE, 12)
         self._simulation.reset(robot.HOME_POSE + joint_noise)
-        self._last_action = self.action_map.from_radians(robot.HOME_POSE)
-        self._frames: deque[np.ndarray] = deque(maxlen=max(self.layout.history - 1, 1))
-        self._ready = True
+        state = self.state
         if self._expert is not None:
-            self._expert.reset(self.state)
-        observation = self._observe()
+            self._expert.reset(state)
+        observation = self._observer.observe(self._simulation, state, self._episode, self.np_random)
         if self.render_mode == "human":
             self.render()
-        return observation, self._info({}, "")
+        return observation, self._info({}, "", state)
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict]:
         """Hold one action for a control period.
@@ -167,25 +166,21 @@ class Go1Env(gymnasium.Env):
             InvalidInputError: if the action is not 12 finite numbers; nothing is stepped.
             gymnasium.error.ResetNeeded: before the first `reset`.
         """
-        self._require_reset("step")
-        self._last_action = np.clip(finite_vector(action, 12, "action"), -1.0, 1.0)
-        self._simulation.step(self.action_map.to_radians(self._last_action), PHYSICS_HZ // self.control_hz)
-        self._phase = (self._phase + self.control_s / self._task.gait.period) % 1.0
-        self._filtered_command += (1 - np.exp(-self.control_s / COMMAND_FILTER_S)) * (
-            self._command - self._filtered_command
-        )
-        self._steps += 1
+        episode = self._running("step")
+        episode.last_action = np.clip(finite_vector(action, 12, "action"), -1.0, 1.0)
+        self._simulation.step(self.action_map.to_radians(episode.last_action), PHYSICS_HZ // self.control_hz)
+        episode.advance(self.control_s)
         state = self.state
         ended = self._ended(state)
         terms = reward_terms(
-            self._task.reward,
-            self._filtered_command,
+            episode.task.reward,
+            episode.filtered_command,
             state.base_velocity,
             state.gravity_b,
             float(state.position_w[2]),
             self._simulation.torque,
         )
-        observation = self._observe(state)
+        observation = self._observer.observe(self._simulation, state, episode, self.np_random)
         if self.render_mode == "human":
             self.render()
         terminated = ended in ("fall", "unstable")
@@ -196,7 +191,7 @@ class Go1Env(gymnasium.Env):
         if self.render_mode is None:
             gymnasium.logger.warn("render() does nothing: the environment was made without a render_mode")
             return None
-        self._require_reset("render")
+        self._running("render")
         if self._renderer is None:
             from go1_mtl_gym import rendering
 
@@ -215,8 +210,7 @@ class Go1Env(gymnasium.Env):
     @property
     def task(self) -> Task:
         """The present task."""
-        self._require_reset("task")
-        return self._task
+        return self._running("task").task
 
     @property
     def simulation(self) -> Simulation:
@@ -226,7 +220,7 @@ class Go1Env(gymnasium.Env):
     @property
     def state(self) -> RobotState:
         """All that an expert may read, now."""
-        self._require_reset("state")
+        episode = self._running("state")
         data = self._simulation.data
         return RobotState(
             position_w=data.qpos[:3].copy(),
@@ -236,16 +230,16 @@ class Go1Env(gymnasium.Env):
             q=self._simulation.q,
             v=self._simulation.v,
             contacts=self._simulation.read().contacts,
-            gait=self._task.gait,
-            phase=self._phase,
-            command=self._filtered_command.copy(),
+            gait=episode.task.gait,
+            phase=episode.phase,
+            command=episode.filtered_command,
         )
 
     def expert_action(self) -> np.ndarray:
         """The expert's action for the present state, float32, shape (12,). Changes nothing, here or later."""
         state = self.state
         if self._expert is None:
-            self._expert = _load_expert(self._arguments["expert"])(gains=self.gains, hold_s=self.control_s)
+            self._expert = load_expert(self._arguments["expert"])(gains=self.gains, hold_s=self.control_s)
             self._expert.reset(state)
         return self.action_map.from_radians(self._expert.action(state)).astype(np.float32)
 
@@ -255,10 +249,10 @@ class Go1Env(gymnasium.Env):
         Raises:
             InvalidInputError: if the task is unknown here, or does not allow the present command.
         """
-        self._require_reset("set_task")
+        episode = self._running("set_task")
         new = TASKS[one_of(task, self.tasks, "task")]
-        new.check_command(self._command)
-        self._task = new
+        new.check_command(episode.command)
+        episode.task = new
 
     def set_command(self, command: Sequence[float]) -> None:
         """Ask for another (vx [m/s], vy [m/s], yaw rate [rad/s]); it is low-passed before expert and student see it.
@@ -266,8 +260,8 @@ class Go1Env(gymnasium.Env):
         Raises:
             InvalidInputError: if it is not three finite numbers within the task's `command_limit`.
         """
-        self._require_reset("set_command")
-        self._command = self._task.check_command(command)
+        episode = self._running("set_command")
+        episode.command = episode.task.check_command(command)
 
     def push(self, delta_velocity_w: Sequence[float]) -> None:
         """Kick the trunk: add to its linear velocity [m/s], world frame, shape (3,).
@@ -275,21 +269,16 @@ class Go1Env(gymnasium.Env):
         Raises:
             InvalidInputError: if it is not three finite numbers.
         """
-        self._require_reset("push")
+        self._running("push")
         self._simulation.push(finite_vector(delta_velocity_w, 3, "push (change of velocity)"))
 
     # -- Copies ------------------------------------------------------------------------------------------------------
 
-    _RUNNING = (
-        "_task", "_command", "_filtered_command", "_phase", "_steps", "_last_action", "_frames",
-    )  # fmt: skip
-
     def __getstate__(self) -> dict[str, Any]:
         """Arguments and running state; a copy continues to the bit, without the original's window or expert."""
-        running = {name: copy.deepcopy(getattr(self, name)) for name in self._RUNNING} if self._ready else None
         return {
             "arguments": self._arguments,
-            "running": running,
+            "episode": copy.deepcopy(self._episode),
             "snapshot": self._simulation.snapshot(),
             "np_random": copy.deepcopy(self._np_random),
             "np_random_seed": getattr(self, "_np_random_seed", None),
@@ -300,78 +289,32 @@ class Go1Env(gymnasium.Env):
         self._simulation.restore(state["snapshot"])
         self._np_random = state["np_random"]
         self._np_random_seed = state["np_random_seed"]
-        if state["running"] is not None:
-            self.__dict__.update(state["running"])
-            self._ready = True
+        self._episode = state["episode"]
 
     # -- Parts of a step ---------------------------------------------------------------------------------------------
 
-    def _require_reset(self, what: str) -> None:
-        if not self._ready:
+    def _running(self, what: str) -> Episode:
+        if self._episode is None:
             raise ResetNeeded(f"call reset() before {what}")
+        return self._episode
 
     def _ended(self, state: RobotState) -> str:
         if not self._simulation.stable:
             return "unstable"
         if state.position_w[2] < FALLEN_HEIGHT or -state.gravity_b[2] < FALLEN_COSINE:
             return "fall"
-        return "time" if self._steps >= self._episode_steps else ""
+        return "time" if self._running("step").steps >= self._episode_steps else ""
 
-    def _observe(self, state: RobotState | None = None) -> np.ndarray:
-        state = self.state if state is None else state
-        reading = self._simulation.read()
-        turn = 2 * np.pi * self._phase
-        parts = {
-            "accelerometer": reading.accelerometer,
-            "gyroscope": reading.gyroscope,
-            "q": state.q,
-            "dq": state.v,
-            "contacts": reading.contacts,
-            "command": self._filtered_command,
-            "gravity": state.gravity_b,
-            "phase": np.array([np.sin(turn), np.cos(turn)]),
-            "last_action": self._last_action,
-        }
-        if self._noise is not None:
-            self._noise.apply(parts, self.np_random)
-        if not self._simulation.stable:
-            parts = {name: np.nan_to_num(part) for name, part in parts.items()}
-        frame = np.concatenate([parts[name] for name in PROPRIOCEPTION])
-        if self._steps == 0:
-            self._frames.extend([frame] * self._frames.maxlen)
-        observation = self.layout.flatten(parts, self._frames, self.tasks.index(self._task.name))
-        self._frames.appendleft(frame)
-        return observation
-
-    def _info(self, terms: dict[str, float], ended: str, state: RobotState | None = None) -> dict[str, Any]:
-        state = self.state if state is None else state
+    def _info(self, terms: dict[str, float], ended: str, state: RobotState) -> dict[str, Any]:
+        episode = self._running("info")
         return {
-            "task": self._task.name,
-            "command": self._command.copy(),
-            "filtered_command": self._filtered_command.copy(),
+            "task": episode.task.name,
+            "command": episode.command.copy(),
+            "filtered_command": episode.filtered_command.copy(),
             "base_velocity": state.base_velocity,
             "contacts": state.contacts,
-            "phase": self._phase,
+            "phase": episode.phase,
             "reward_terms": terms,
             "fallen": ended in ("fall", "unstable"),
             "ended": ended,
         }
-
-
-def _checked_tasks(tasks: Sequence[str]) -> tuple[str, ...]:
-    if isinstance(tasks, str) or not tasks:
-        raise InvalidInputError(f'tasks must be a sequence of task names such as ("trot",), got {tasks!r}')
-    for name in tasks:
-        one_of(name, tuple(TASKS), "task")
-    if len(set(tasks)) != len(tasks):
-        raise InvalidInputError(f"tasks must differ from each other, got {tuple(tasks)}")
-    return tuple(tasks)
-
-
-def _load_expert(expert: str | Callable[..., Any]) -> Callable[..., Any]:
-    if callable(expert):
-        return expert
-    module, _, name = expert.partition(":")
-    if not name:
-        raise InvalidInputError(f'expert must be "module:Class" or a callable, got {expert!r}')
-    return getattr(import_module(module), name)

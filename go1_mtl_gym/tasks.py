@@ -1,5 +1,6 @@
 """Tasks: a gait, the commands it is asked to follow, and what its reward weighs."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
@@ -8,7 +9,7 @@ import numpy as np
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.gaits import GAITS, Gait
 from go1_mtl_gym.rewards import RewardWeights
-from go1_mtl_gym.validation import finite_vector
+from go1_mtl_gym.validation import finite_vector, one_of
 
 
 @dataclass(frozen=True)
@@ -73,3 +74,18 @@ TASKS = MappingProxyType(
     }
 )
 """The registered tasks by name; their order is the order of a policy's heads and of the one-hot task id."""
+
+
+def check_task_names(names: object) -> tuple[str, ...]:
+    """Return a sequence of different names of `TASKS` as a tuple.
+
+    Raises:
+        InvalidInputError: if it is something else.
+    """
+    if isinstance(names, str) or not isinstance(names, Sequence) or not names:
+        raise InvalidInputError(f'tasks must be a sequence of task names such as ("trot",), got {names!r}')
+    for name in names:
+        one_of(name, tuple(TASKS), "task")
+    if len(set(names)) != len(names):
+        raise InvalidInputError(f"tasks must differ from each other, got {tuple(names)}")
+    return tuple(names)

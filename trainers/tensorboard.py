@@ -13,7 +13,6 @@ from trainers.metrics import json_ready
 if TYPE_CHECKING:
     import matplotlib.figure
 
-    from trainers.evaluation import ClosedLoopResult
 
 NOT_TEXT = ("stdout", "log", "json", "csv")
 ROUND_FIGURES = ("success_rate", "survival_rate", "survival_s", "velocity_error", "yaw_rate_error", "step_rate")
@@ -36,7 +35,7 @@ def make_logger(
 def log_round(
     logger: HierarchicalLogger,
     step: int,
-    closed_loop: Mapping[str, "ClosedLoopResult"] | None = None,
+    closed_loop: Mapping[str, Mapping[str, Any]] | None = None,
     offline: Mapping[str, Mapping[str, float]] | None = None,
 ) -> None:
     """Write the scores of one DAgger round.
@@ -44,12 +43,14 @@ def log_round(
     Args:
         logger: from `make_logger`.
         step: the round; 0 after cloning.
-        closed_loop: task -> result of `trainers.evaluate`; tags ``closed_loop/<figure>/<task>``.
+        closed_loop: task -> ``as_dict()`` of what `trainers.evaluate` returned; tags ``closed_loop/<figure>/<task>``. A
+            figure that is None, because every episode fell too early, is left out.
         offline: task -> result of `trainers.offline_metrics`; tags ``offline/<figure>/<task>``.
     """
     for task, result in (closed_loop or {}).items():
         for name in ROUND_FIGURES:
-            logger.record(f"closed_loop/{name}/{task}", getattr(result, name))
+            if result[name] is not None:
+                logger.record(f"closed_loop/{name}/{task}", result[name])
     for task, scores in (offline or {}).items():
         for name, value in scores.items():
             logger.record(f"offline/{name}/{task}", value)

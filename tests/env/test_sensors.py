@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from go1_mtl_gym import robot
-from go1_mtl_gym.env import COMMAND_FILTER_S, Go1Env
+from go1_mtl_gym.env import Go1Env
+from go1_mtl_gym.episode import COMMAND_FILTER_S
 from go1_mtl_gym.observation import SensorNoise
 
 ALL = ("command", "gravity", "phase", "last_action")

@@ -13,7 +13,7 @@ from trainers import evaluate, joint_target_figure, log_figure, log_round, log_t
 def test_round_text_and_figure_reach_tensorboard(policy, demos, tmp_path):
     logger = make_logger(tmp_path)
     result = evaluate("expert", "trot", 1, 3.0, make_env=make_stub)
-    log_round(logger, 2, {"trot": result}, offline_metrics(policy, demos))
+    log_round(logger, 2, {"trot": result.as_dict()}, offline_metrics(policy, demos))
     log_text(logger, "config", {"seed": 1, "nan": float("nan")})
     log_figure(logger, "joint_targets", joint_target_figure(policy, demos), 2)
     logger.close()

@@ -1,0 +1,40 @@
+"""How the environment finds its expert without knowing it."""
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import Protocol
+
+import numpy as np
+
+from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.state import RobotState
+
+DEFAULT_EXPERT = "experts.nmpc:NMPCExpert"
+
+
+class Expert(Protocol):
+    """What the environment asks of an expert."""
+
+    def reset(self, state: RobotState) -> None:
+        """Begin an episode."""
+
+    def action(self, state: RobotState) -> np.ndarray:
+        """Joint targets [rad], shape (12,)."""
+
+
+def load_expert(expert: str | Callable[..., Expert]) -> Callable[..., Expert]:
+    """What makes an expert, from ``"module:Class"`` or from itself.
+
+    Raises:
+        InvalidInputError: if it is neither, or the module holds nothing of that name.
+        ImportError: if the module cannot be imported.
+    """
+    if callable(expert):
+        return expert
+    module, _, name = expert.partition(":") if isinstance(expert, str) else ("", "", "")
+    if not name:
+        raise InvalidInputError(f'expert must be "module:Class" or a callable, got {expert!r}')
+    try:
+        return getattr(import_module(module), name)
+    except AttributeError as error:
+        raise InvalidInputError(f"expert {expert!r}: the module {module} holds no {name}") from error

@@ -1,0 +1,58 @@
+"""From the robot's state to the observation: readings, noise, and the memory of earlier frames."""
+
+import numpy as np
+
+from go1_mtl_gym.episode import Episode
+from go1_mtl_gym.observation import PROPRIOCEPTION, ObservationLayout, SensorNoise
+from go1_mtl_gym.simulation import Simulation
+from go1_mtl_gym.state import RobotState
+
+
+class Observer:
+    """Makes observations.
+
+    Args:
+        layout: which parts there are.
+        noise: of the sensors, or None.
+        tasks: names in the order of the task id.
+    """
+
+    def __init__(self, layout: ObservationLayout, noise: SensorNoise | None, tasks: tuple[str, ...]) -> None:
+        self._layout = layout
+        self._noise = noise
+        self._tasks = tasks
+
+    def observe(
+        self, simulation: Simulation, state: RobotState, episode: Episode, rng: np.random.Generator
+    ) -> np.ndarray:
+        """The observation after a reset or step, float32, shape (layout.size,); call it once for each.
+
+        Args:
+            simulation: whose sensors are read.
+            state: the robot's state now.
+            episode: its present frame is added to `older_frames`.
+            rng: of the noise.
+        """
+        reading = simulation.read()
+        turn = 2 * np.pi * episode.phase
+        parts = {
+            "accelerometer": reading.accelerometer,
+            "gyroscope": reading.gyroscope,
+            "q": state.q,
+            "dq": state.v,
+            "contacts": reading.contacts,
+            "command": episode.filtered_command,
+            "gravity": state.gravity_b,
+            "phase": np.array([np.sin(turn), np.cos(turn)]),
+            "last_action": episode.last_action,
+        }
+        if self._noise is not None:
+            self._noise.apply(parts, rng)
+        if not simulation.stable:
+            parts = {name: np.nan_to_num(part) for name, part in parts.items()}
+        frame = np.concatenate([parts[name] for name in PROPRIOCEPTION])
+        if episode.steps == 0:
+            episode.older_frames.extend([frame] * (self._layout.history - 1))
+        observation = self._layout.flatten(parts, episode.older_frames, self._tasks.index(episode.task.name))
+        episode.older_frames.appendleft(frame)
+        return observation
