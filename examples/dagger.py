@@ -35,6 +35,7 @@ from trainers.files import write_atomically
 from trainers.metrics import json_ready
 
 LEARNERS = ("multi_head", "pooled", "paper_literal")
+PICTURE = {"width": 280, "height": 210, "fps": 25}
 
 
 class Job:
@@ -236,12 +237,13 @@ class Job:
             with self.stage("videos"):
                 for task in tqdm(self.config.tasks, "videos", unit="gait"):
                     command = (0.8 * TASKS[task].command_range[0], 0.0, 0.0)
-                    frames[task] = trainers.record_frames(policy, task, self.config.video_s, command)
+                    frames[task] = trainers.record_frames(policy, task, self.config.video_s, command, **PICTURE)
                     trainers.save_gif(frames[task], self.out / f"{task}.gif")
         except RenderingError as error:
             print(f"no videos: {error}")
             return
-        trainers.save_gif(trainers.tile(frames), self.out / "gaits.gif")
+        mosaic = trainers.tile({task: film[::2] for task, film in frames.items()})
+        trainers.save_gif(mosaic, self.out / "gaits.gif", PICTURE["fps"] / 2)
 
     # -- Housekeeping --------------------------------------------------------------------------------------------------
 

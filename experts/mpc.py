@@ -19,6 +19,8 @@ from experts.dynamics import FORCE_UNIT, LinearModel
 from go1_mtl_gym.validation import number_in
 
 NX = NU = 12
+LARGEST = 1e6
+"""A problem with a larger number than this in it is refused; OSQP would take it silently and may stay stuck."""
 INEXACT = 1e-2
 """Largest residual, in the units of the program, with which an unfinished solution is still used."""
 
@@ -213,8 +215,7 @@ class MPC:
         n = self.config.steps
         program = self.program
         program.update(model, x0, x_ref, u_ref, contact)
-        finite = all(np.isfinite(part).all() for part in (program.q, program.A.data, program.l))
-        if not finite:  # OSQP would take it and stay stuck on later, good problems
+        if not all((np.abs(part) < LARGEST).all() for part in (program.q, program.A.data, program.l, contact)):
             return Solution(np.zeros((4, 3)), x_ref, u_ref, 0, solved=False, usable=False)
         self._solver.update(q=program.q, l=program.l, u=program.u, Ax=program.A.data)
         self._solver.warm_start(x=np.concatenate([x_ref.ravel(), u_ref.ravel()]), y=self._multipliers)

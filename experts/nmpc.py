@@ -23,7 +23,7 @@ import numpy as np
 from experts.dynamics import FORCE_UNIT, linearise
 from experts.footholds import FootholdRule
 from experts.model import Dynamics, RobotModel
-from experts.mpc import MPC, MPCConfig
+from experts.mpc import LARGEST, MPC, MPCConfig
 from experts.nominal import NominalMotion, nominal_motion
 from experts.reference import body_reference
 from experts.swing import SwingRule
@@ -65,7 +65,7 @@ class Counters:
         calls: of `action`.
         inexact_solves: solves that ran out of iterations close to the optimum and were used.
         solver_failures: solves that gave no usable forces; the last good ones were used.
-        bad_states: states that were not finite; the home pose was answered.
+        bad_states: states with a number that is not finite or beyond any robot's; the home pose was answered.
         iterations: of the QP solver in all.
     """
 
@@ -95,19 +95,18 @@ class NMPCExpert:
         self.counters = Counters()
         self._model = RobotModel()
         self._mpc = MPC(self.config.mpc)
-        self._last_good_forces = np.zeros((4, 3))
+        self._last_good_forces = _standing_forces()
         self._standing_inertia = np.diag(self._model.standing_inertia())
 
     def reset(self, state: RobotState) -> None:
         """Begin an episode: clear the counters and share the weight evenly for the case that the first solve fails."""
         self.counters = Counters()
-        self._last_good_forces = np.zeros((4, 3))
-        self._last_good_forces[:, 2] = robot.MASS * robot.GRAVITY / 4
+        self._last_good_forces = _standing_forces()
 
     def action(self, state: RobotState) -> np.ndarray:
         """Joint targets for the PD actuators [rad], shape (12,), legs FL FR RL RR; never NaN, never an exception."""
         self.counters.calls += 1
-        if not _finite(state):
+        if not _plausible(state):
             self.counters.bad_states += 1
             return robot.HOME_POSE.copy()
         torque, acceleration = self.torque(state)
@@ -156,7 +155,13 @@ class NMPCExpert:
         return nominal_motion(state.gait, *self._standing_inertia[:2])
 
 
-def _finite(state: RobotState) -> bool:
+def _standing_forces() -> np.ndarray:
+    forces = np.zeros((4, 3))
+    forces[:, 2] = robot.MASS * robot.GRAVITY / 4
+    return forces
+
+
+def _plausible(state: RobotState) -> bool:
     parts = (
         state.position_w,
         state.quat_wxyz,
@@ -167,4 +172,4 @@ def _finite(state: RobotState) -> bool:
         state.command,
         [state.phase],
     )
-    return all(np.isfinite(part).all() for part in parts)
+    return all((np.abs(part) < LARGEST).all() for part in parts)

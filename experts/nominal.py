@@ -16,8 +16,6 @@ from go1_mtl_gym.gaits import Gait
 
 SAMPLES = 96
 """Grid points per cycle."""
-MIN_LOAD = 0.12
-"""Least load of a foot on the ground, in units of the weight; an unloaded foot would chatter."""
 _MOMENT_WEIGHT = 20.0  # levelness against evenness of the load when sharing it between the feet
 
 
@@ -52,13 +50,13 @@ def _periodic(samples: np.ndarray, phase: np.ndarray) -> np.ndarray:
 
 
 def _share_load(stance: np.ndarray, total: float) -> np.ndarray:
-    """Loads of the feet on the ground, at least `MIN_LOAD`, that add up to `total`, nearly level and nearly even."""
+    """Non-negative loads of the feet on the ground that add up to `total`, nearly level and nearly even."""
     arm = robot.NOMINAL_FOOT_B[stance, :2] / 0.1
     count = int(stance.sum())
     rows = np.vstack([1e3 * np.ones(count), _MOMENT_WEIGHT * arm.T, np.eye(count)])
     target = np.concatenate([[1e3 * total, 0.0, 0.0], np.full(count, total / count)])
     load = np.zeros(4)
-    load[stance] = MIN_LOAD + nnls(rows, target - MIN_LOAD * rows.sum(axis=1))[0]
+    load[stance] = nnls(rows, target)[0]
     return load
 
 

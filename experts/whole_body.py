@@ -36,6 +36,9 @@ def joint_torques(
     generalised = dynamics.jacobian.T @ force
     system = np.vstack([dynamics.mass_matrix[:6], dynamics.jacobian])
     target = np.concatenate([generalised[:6] - dynamics.bias[:6], (foot - dynamics.drift).ravel()])
-    acceleration = np.linalg.solve(system, target)
+    try:
+        acceleration = np.linalg.solve(system, target)
+    except np.linalg.LinAlgError:  # a leg stretched to the singular point
+        acceleration = np.linalg.lstsq(system, target, rcond=None)[0]
     torque = (dynamics.mass_matrix @ acceleration + dynamics.bias - generalised)[6:]
     return np.clip(torque, -robot.TORQUE_LIMIT, robot.TORQUE_LIMIT), acceleration[6:]

@@ -14,7 +14,7 @@ from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import ActionMap, PDGains
 from go1_mtl_gym.episode import Episode
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.expert_hook import DEFAULT_EXPERT, load_expert
+from go1_mtl_gym.expert_hook import DEFAULT_EXPERT, check_expert, load_expert
 from go1_mtl_gym.observation import ObservationLayout, SensorNoise
 from go1_mtl_gym.observer import Observer
 from go1_mtl_gym.rewards import reward_terms
@@ -93,14 +93,16 @@ class Go1Env(gymnasium.Env):
         self.tasks = check_task_names(tasks)
         if task is not None:
             one_of(task, self.tasks, "task")
-        number_in(control_hz, 50, PHYSICS_HZ, "control_hz")
-        if PHYSICS_HZ % control_hz:
-            raise InvalidInputError(f"control_hz must divide {PHYSICS_HZ}, got {control_hz}")
+        rate = number_in(control_hz, 50, PHYSICS_HZ, "control_hz")
+        if rate % 1 or PHYSICS_HZ % rate:
+            raise InvalidInputError(f"control_hz must be an integer that divides {PHYSICS_HZ}, got {control_hz}")
+        for name, size in (("width", width), ("height", height)):
+            number_in(size, 16, 8192, f"{name} [pixels]")
         if render_mode is not None:
             one_of(render_mode, self.metadata["render_modes"], "render_mode")
         if not (noise is None or isinstance(noise, (bool, SensorNoise))):
             raise InvalidInputError(f"noise must be None, True, False or a SensorNoise, got {noise!r}")
-        self.control_hz = int(control_hz)
+        self.control_hz = int(rate)
         self.control_s = 1.0 / self.control_hz
         self.gains = PDGains(kp, kd)
         self.action_map = ActionMap.for_gains(self.gains)
@@ -110,8 +112,9 @@ class Go1Env(gymnasium.Env):
         self.render_mode = render_mode
         self.metadata = self.metadata | {"render_fps": min(self.control_hz, 50)}
         self._observer = Observer(self.layout, SensorNoise() if noise is True else (noise or None), self.tasks)
-        self._episode_steps = round(number_in(episode_s, 1.0 / control_hz, 1e6, "episode_s") * control_hz)
+        self._episode_steps = round(number_in(episode_s, 1.0 / rate, 1e6, "episode_s") * control_hz)
         self._simulation = Simulation(self.gains)
+        self._make_expert = check_expert(expert)
         self._expert: Any = None
         self._renderer: Any = None
         self._episode: Episode | None = None
@@ -180,6 +183,8 @@ class Go1Env(gymnasium.Env):
             float(state.position_w[2]),
             self._simulation.torque,
         )
+        if ended == "unstable":  # nothing measured means anything any more
+            terms = dict.fromkeys(terms, 0.0)
         observation = self._observer.observe(self._simulation, state, episode, self.np_random)
         if self.render_mode == "human":
             self.render()
@@ -239,7 +244,7 @@ class Go1Env(gymnasium.Env):
         """The expert's action for the present state, float32, shape (12,). Changes nothing, here or later."""
         state = self.state
         if self._expert is None:
-            self._expert = load_expert(self._arguments["expert"])(gains=self.gains, hold_s=self.control_s)
+            self._expert = load_expert(self._make_expert)(gains=self.gains, hold_s=self.control_s)
             self._expert.reset(state)
         return self.action_map.from_radians(self._expert.action(state)).astype(np.float32)
 
@@ -311,7 +316,7 @@ class Go1Env(gymnasium.Env):
             "task": episode.task.name,
             "command": episode.command.copy(),
             "filtered_command": episode.filtered_command.copy(),
-            "base_velocity": state.base_velocity,
+            "base_velocity": np.nan_to_num(state.base_velocity),
             "contacts": state.contacts,
             "phase": episode.phase,
             "reward_terms": terms,

@@ -22,18 +22,30 @@ class Expert(Protocol):
         """Joint targets [rad], shape (12,)."""
 
 
-def load_expert(expert: str | Callable[..., Expert]) -> Callable[..., Expert]:
-    """What makes an expert, from ``"module:Class"`` or from itself.
+def check_expert(expert: object) -> str | Callable[..., Expert]:
+    """Return what `load_expert` takes, without importing anything.
 
     Raises:
-        InvalidInputError: if it is neither, or the module holds nothing of that name.
-        ImportError: if the module cannot be imported.
+        InvalidInputError: if it is neither callable nor of the form ``"module:Class"``.
     """
     if callable(expert):
         return expert
     module, _, name = expert.partition(":") if isinstance(expert, str) else ("", "", "")
-    if not name:
+    if not (module and name):
         raise InvalidInputError(f'expert must be "module:Class" or a callable, got {expert!r}')
+    return expert
+
+
+def load_expert(expert: str | Callable[..., Expert]) -> Callable[..., Expert]:
+    """What makes an expert, from ``"module:Class"`` or from itself.
+
+    Raises:
+        InvalidInputError: if the module holds nothing of that name.
+        ImportError: if the module cannot be imported.
+    """
+    if callable(expert):
+        return expert
+    module, _, name = expert.partition(":")
     try:
         return getattr(import_module(module), name)
     except AttributeError as error:

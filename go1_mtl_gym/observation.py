@@ -96,13 +96,13 @@ class ObservationLayout:
     """
 
     def __init__(self, tasks: Sequence[str], channels: Sequence[str] = (), history: int = 1) -> None:
-        if isinstance(channels, str):
+        if isinstance(channels, str) or not isinstance(channels, Sequence):
             raise InvalidInputError(f'channels must be a sequence of names such as ("command",), got {channels!r}')
         for name in channels:
             one_of(name, tuple(CHANNELS), "channel")
         if len(set(channels)) != len(channels):
             raise InvalidInputError(f"channels must differ from each other, got {tuple(channels)}")
-        if not isinstance(history, (int, np.integer)) or not 1 <= history <= 50:
+        if isinstance(history, bool) or not isinstance(history, (int, np.integer)) or not 1 <= history <= 50:
             raise InvalidInputError(f"history must be an integer from 1 to 50, got {history!r}")
         self.channels = tuple(name for name in CHANNELS if name in channels)
         self.history = int(history)

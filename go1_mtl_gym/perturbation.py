@@ -64,8 +64,13 @@ class PerturbationWrapper(gymnasium.Wrapper):
         return result
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict]:
-        """Disturb, then step. ``info["executed_action"]`` is the action with its noise."""
+        """Disturb, then step; ``info["executed_action"]`` is the action with its noise.
+
+        Raises:
+            InvalidInputError: if the action is not 12 finite numbers; nothing is disturbed or stepped.
+        """
         env = self.env.unwrapped
+        action = finite_vector(action, 12, "action")
         keep = np.exp(-env.control_s / NOISE_CORRELATION_S)
         self._noise = keep * self._noise + np.sqrt(1 - keep**2) * self._sigma * self._rng.standard_normal(12)
         self._time += env.control_s
@@ -76,7 +81,7 @@ class PerturbationWrapper(gymnasium.Wrapper):
         if self._time >= self._next_command:
             self._next_command = self._time + self._draw_command_time()
             env.set_command(env.task.draw_command(self._rng))
-        executed = np.clip(np.asarray(action, dtype=np.float64) + self._noise, -1.0, 1.0).astype(np.float32)
+        executed = np.clip(action + self._noise, -1.0, 1.0).astype(np.float32)
         observation, reward, terminated, truncated, info = self.env.step(executed)
         return observation, reward, terminated, truncated, info | {"executed_action": executed}
 

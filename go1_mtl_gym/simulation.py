@@ -31,7 +31,8 @@ class Simulation:
         gains: of the PD actuators.
 
     Attributes:
-        model: the MuJoCo model; private to this simulation, so it may be changed (friction, masses).
+        model: the MuJoCo model; private to this simulation, so it may be changed (friction, masses). Copies of an
+            environment begin with the unchanged model.
         data: the MuJoCo data.
     """
 

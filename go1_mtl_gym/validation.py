@@ -1,6 +1,7 @@
 """Small checks shared by everything that takes numbers from a user."""
 
 from collections.abc import Sequence
+from numbers import Real
 
 import numpy as np
 
@@ -35,10 +36,9 @@ def number_in(value: object, low: float, high: float, what: str) -> float:
     Raises:
         InvalidInputError: if it is not a finite number in that range.
     """
-    try:
-        number = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError) as error:
-        raise InvalidInputError(f"{what} must be a number in [{low:g}, {high:g}], got {value!r}") from error
+    if not isinstance(value, Real):
+        raise InvalidInputError(f"{what} must be a number in [{low:g}, {high:g}], got {value!r}")
+    number = float(value)
     if not low <= number <= high:
         raise InvalidInputError(f"{what} must lie in [{low:g}, {high:g}], got {number:g}")
     return number

@@ -9,7 +9,7 @@ import pytest
 
 from experts import MPCConfig
 from go1_mtl_gym import env as environment
-from go1_mtl_gym import robot
+from go1_mtl_gym import episode, robot
 from trainers import MultiHeadPolicy, evaluation, make_env
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -98,7 +98,7 @@ def test_figures_in_the_text_are_the_codes():
     assert f"trunk below {environment.FALLEN_HEIGHT} m" in PROSE
     tilt = np.degrees(np.arccos(environment.FALLEN_COSINE))
     assert f"tilted by more than {tilt:.0f} degrees" in PROSE
-    assert f"time constant {environment.COMMAND_FILTER_S} s" in PROSE
+    assert f"time constant {episode.COMMAND_FILTER_S} s" in PROSE
     hip, thigh, calf = robot.TORQUE_LIMIT[:3]
     assert f"torque limits of {hip}, {thigh} and {calf} N m" in PROSE
 
