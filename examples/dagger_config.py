@@ -92,7 +92,8 @@ class JobConfig:
     @property
     def bc(self) -> BCConfig:
         """How to clone."""
-        return BCConfig(steps=self.clone_steps, batch_size=self.batch_size, seed=self.seed)
+        interval = max(50, self.clone_steps // 30)  # each entry of the log costs a pass over the held-out rows
+        return BCConfig(steps=self.clone_steps, batch_size=self.batch_size, log_interval=interval, seed=self.seed)
 
     @property
     def round_bc(self) -> BCConfig:

@@ -138,7 +138,7 @@ def _labelled(picture: np.ndarray, name: str) -> np.ndarray:
     return np.asarray(image)
 
 
-def save_gif(frames: np.ndarray, path: str | PathLike[str], fps: int = 25) -> None:
+def save_gif(frames: np.ndarray, path: str | PathLike[str], fps: float = 25) -> None:
     """Write an endlessly looping GIF; all frames share one palette made from some of them, without dithering.
 
     The file is complete or not there. GIFs count in hundredths of a second, so 25 and 50 frames per second are exact.
