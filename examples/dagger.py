@@ -28,11 +28,10 @@ from dagger_students import new_policy, train_baseline
 from tqdm.auto import tqdm
 
 import trainers
-from go1_mtl_gym import TASKS, Go1Error
+from go1_mtl_gym import TASKS, Go1Error, InvalidInputError
 from go1_mtl_gym.rendering import RenderingError
 from trainers.checkpoint import versions
-from trainers.files import write_atomically
-from trainers.metrics import json_ready
+from trainers.files import json_ready, write_json
 
 LEARNERS = ("multi_head", "pooled", "paper_literal")
 PICTURE = {"width": 280, "height": 210, "fps": 25}
@@ -46,12 +45,13 @@ class Job:
         out: folder of the results; made if missing.
 
     Raises:
-        InvalidInputError: if the folder holds a run with other settings.
+        InvalidInputError: if a setting cannot be, or the folder holds a run with other settings.
     """
 
     def __init__(self, config: JobConfig, out: Path) -> None:
         self.config = config
         self.out = out
+        new_policy(config, config.env_kwargs)  # refuses impossible settings before anything is written
         self._claim()
         self._times_path = out / "parts" / "seconds.json"
         self.seconds: dict[str, float] = _read_json(self._times_path) or {}
@@ -198,7 +198,7 @@ class Job:
             "seconds": self.seconds,
             "command": shlex.join(["python", "examples/dagger.py", *sys.argv[1:]]),
         }
-        _write_json(self.out / "metrics.json", metrics)
+        write_json(self.out / "metrics.json", metrics)
         return metrics
 
     def closed_loop(self, policy: Any, name: str, task: str, episodes: int) -> dict[str, Any]:
@@ -218,7 +218,7 @@ class Job:
                 **(config.env_kwargs if policy == "expert" else {}),
             )
             known = json_ready(result.as_dict() | {"learner": name})
-            _write_json(path, known)
+            write_json(path, known)
         kept = {key: value for key, value in known.items() if key not in ("task", "learner", "episodes", "seconds")}
         return kept | {"episodes": len(known["episodes"])}
 
@@ -255,7 +255,7 @@ class Job:
             yield
         finally:
             self.seconds[name] = round(self.seconds.get(name, 0.0) + time.monotonic() - start, 1)
-            _write_json(self._times_path, self.seconds)
+            write_json(self._times_path, self.seconds)
 
     def _claim(self) -> None:
         path = self.out / "config.json"
@@ -263,26 +263,23 @@ class Job:
         settings.pop("n_envs")
         known = _read_json(path)
         if known is None:
-            _write_json(path, settings)
+            write_json(path, settings)
         elif known != settings:
             changed = sorted(name for name in settings if known.get(name) != settings[name])
-            raise Go1Error(f"{self.out} holds a run with other settings ({', '.join(changed)}); choose another --out")
+            what = f"a run with other settings ({', '.join(changed)})"
+            raise InvalidInputError(f"{self.out} holds {what}; choose another --out")
 
 
 def _read_json(path: Path) -> Any:
     return json.loads(path.read_text()) if path.is_file() else None
 
 
-def _write_json(path: Path, value: Any) -> None:
-    text = json.dumps(json_ready(value), indent=1)
-    write_atomically(path, lambda file: file.write(text.encode()))
-
-
 def main(arguments: list[str] | None = None, announce: Callable[[str], None] = print) -> int:
     """Run the job from the command line; returns the exit status."""
-    config, folder = parse(arguments)
-    out = Path(folder) if folder else Path("runs") / time.strftime("%Y-%m-%d_%H-%M-%S")
+    out = Path("runs") / time.strftime("%Y-%m-%d_%H-%M-%S")
     try:
+        config, folder = parse(arguments)
+        out = Path(folder or out)
         metrics = Job(config, out).run()
     except KeyboardInterrupt:
         announce(f"\ninterrupted; what is done is kept, go on with: --out {out}")

@@ -8,10 +8,17 @@ import torch
 from dagger_config import JobConfig
 
 import trainers
+from go1_mtl_gym import InvalidInputError
 
 
 def new_policy(config: JobConfig, env_kwargs: dict[str, Any], pooled: bool = False) -> trainers.MultiHeadPolicy:
-    """An untrained student for the environments that `env_kwargs` describe."""
+    """An untrained student for the environments that `env_kwargs` describe.
+
+    Raises:
+        InvalidInputError: if there can be no such environment or student, or the device is not there.
+    """
+    if config.device != "cpu" and not (config.device.startswith("cuda") and torch.cuda.is_available()):
+        raise InvalidInputError(f"device must be cpu, or cuda where PyTorch finds a GPU; got {config.device!r}")
     env = trainers.make_env(config.tasks[0], **env_kwargs)
     policy = trainers.MultiHeadPolicy(
         env.observation_space,

@@ -5,7 +5,6 @@ python examples/evaluate_expert.py --tasks trot --episodes 1 --seconds 5 --out t
 """
 
 import argparse
-import json
 import os
 import shlex
 import sys
@@ -18,8 +17,7 @@ from publish_results import without_out
 import trainers
 from go1_mtl_gym import TASKS, Go1Error
 from trainers.checkpoint import versions
-from trainers.files import write_atomically
-from trainers.metrics import json_ready
+from trainers.files import write_json
 from trainers.report import closed_loop_table
 
 OUT = Path("docs/results/expert.json")
@@ -82,8 +80,7 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"error: {error}", file=sys.stderr)
         return 2
     scores["command"] = without_out(shlex.join(["python", "examples/evaluate_expert.py", *arguments]))
-    text = json.dumps(json_ready(scores), indent=1)
-    write_atomically(options.out, lambda file: file.write(text.encode()))
+    write_json(options.out, scores)
     print(f"\n{closed_loop_table(scores['tasks'])}\n\nrecords of all episodes: {options.out}")
     return 0
 

@@ -21,7 +21,7 @@ from dagger_config import PRESETS, JobConfig
 
 from go1_mtl_gym import TASKS
 from go1_mtl_gym.errors import InvalidInputError
-from trainers.files import write_atomically
+from trainers.files import write_atomically, write_json
 from trainers.report import closed_loop_table, markdown, paper_table, results_table, seconds_table
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -66,7 +66,7 @@ def copy_run(run: Path, results: Path) -> None:
     metrics = read_json(run / "metrics.json")
     results_table(metrics)
     metrics["command"] = without_out(metrics.get("command", "python examples/dagger.py"))
-    _write(results / "metrics.json", json.dumps(metrics, indent=1) + "\n")
+    write_json(results / "metrics.json", metrics)
     for name in COPIED:
         shutil.copyfile(run / name, results / name)
 

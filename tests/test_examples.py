@@ -13,6 +13,7 @@ import pytest
 from go1_mtl_gym import TASKS
 
 ROOT = Path(__file__).parent.parent
+IMPOSSIBLE = [("--control-hz", "300"), ("--device", "tpu"), ("--rounds", "-1"), ("--history", "0"), ("--seed", "-1")]
 CLOSED_LOOP = {"survival_rate", "survival_s", "velocity_error", "step_rate", "success_rate"}
 ONE_STEP = {"mse", "mae", "r2", "r2_joint_mean"}
 
@@ -27,6 +28,14 @@ def finish(process: subprocess.Popen) -> str:
     output, _ = process.communicate(timeout=600)
     assert process.returncode == 0, output[-4000:]
     return output
+
+
+@pytest.mark.parametrize("option", IMPOSSIBLE, ids=lambda option: option[0])
+def test_impossible_settings_are_refused_before_anything_is_written(option, tmp_path):
+    process = start("--preset", "smoke", "--out", str(tmp_path / "run"), *option)
+    output, _ = process.communicate(timeout=120)
+    assert process.returncode == 2 and "error: " in output and option[1] in output
+    assert not (tmp_path / "run").exists()
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,8 @@ from tqdm.auto import tqdm
 from go1_mtl_gym import TASKS, Gait
 from go1_mtl_gym.errors import InvalidInputError
 from trainers.environments import EnvFactory, derive_seed, make_env
-from trainers.metrics import json_ready, touchdowns, tracking_error, wilson_interval
+from trainers.files import json_ready
+from trainers.metrics import touchdowns, tracking_error, wilson_interval
 
 SETTLE_S = 2.0
 """Start of an episode that counts for survival only [s]."""

@@ -1,7 +1,7 @@
 """Figures of merit as pure functions of arrays: one-step errors, velocity tracking, touchdowns, success intervals."""
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -123,14 +123,3 @@ def wilson_interval(successes: int, trials: int, z: float = 1.96) -> tuple[float
     centre = (p + z * z / (2 * trials)) / shrink
     half = z * math.sqrt(p * (1 - p) / trials + z * z / (4 * trials * trials)) / shrink
     return max(0.0, centre - half), min(1.0, centre + half)
-
-
-def json_ready(value: Any) -> Any:
-    """Copy of nested dicts and sequences in which NaN and infinity are None and numpy values are Python's."""
-    if isinstance(value, dict):
-        return {str(name): json_ready(item) for name, item in value.items()}
-    if isinstance(value, (list, tuple, np.ndarray)):
-        return [json_ready(item) for item in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from imitation.util.logger import HierarchicalLogger, make_output_format
 from stable_baselines3.common.logger import Figure, Logger
 
-from trainers.metrics import json_ready
+from trainers.files import json_ready
 
 if TYPE_CHECKING:
     import matplotlib.figure
