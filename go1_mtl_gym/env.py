@@ -21,12 +21,9 @@ from go1_mtl_gym.rewards import reward_terms
 from go1_mtl_gym.simulation import PHYSICS_HZ, Simulation
 from go1_mtl_gym.state import RobotState
 from go1_mtl_gym.tasks import TASKS, Task, check_task_names
+from go1_mtl_gym.termination import how_it_ended
 from go1_mtl_gym.validation import finite_vector, number_in, one_of
 
-FALLEN_HEIGHT = 0.14
-"""A trunk lower than this has fallen [m]."""
-FALLEN_COSINE = 0.5
-"""A trunk tilted by more than arccos of this has fallen."""
 RESET_JOINT_NOISE = 0.03
 """Largest deviation of a joint from the home pose after a reset [rad]."""
 
@@ -98,8 +95,7 @@ class Go1Env(gymnasium.Env):
             raise InvalidInputError(f"control_hz must be an integer that divides {PHYSICS_HZ}, got {control_hz}")
         for name, size in (("width", width), ("height", height)):
             number_in(size, 16, 8192, f"{name} [pixels]")
-        if render_mode is not None:
-            one_of(render_mode, self.metadata["render_modes"], "render_mode")
+        one_of(render_mode, (*self.metadata["render_modes"], None), "render_mode")
         if not (noise is None or isinstance(noise, (bool, SensorNoise))):
             raise InvalidInputError(f"noise must be None, True, False or a SensorNoise, got {noise!r}")
         self.control_hz = int(rate)
@@ -142,10 +138,9 @@ class Go1Env(gymnasium.Env):
         super().reset(seed=seed)
         task = TASKS[options.get("task") or self._arguments["task"] or str(self.np_random.choice(self.tasks))]
         drawn = task.draw_command(self.np_random)
-        command = options.get("command")
         self._episode = Episode(
             task=task,
-            command=drawn if command is None else task.check_command(command),
+            command=drawn if options.get("command") is None else task.check_command(options["command"]),
             last_action=self.action_map.from_radians(robot.HOME_POSE),
             older_frames=deque(maxlen=self.layout.history - 1),
         )
@@ -174,7 +169,7 @@ class Go1Env(gymnasium.Env):
         self._simulation.step(self.action_map.to_radians(episode.last_action), PHYSICS_HZ // self.control_hz)
         episode.advance(self.control_s)
         state = self.state
-        ended = self._ended(state)
+        ended = how_it_ended(state, self._simulation.stable, episode.steps >= self._episode_steps)
         terms = reward_terms(
             episode.task.reward,
             episode.filtered_command,
@@ -225,20 +220,7 @@ class Go1Env(gymnasium.Env):
     @property
     def state(self) -> RobotState:
         """All that an expert may read, now."""
-        episode = self._running("state")
-        data = self._simulation.data
-        return RobotState(
-            position_w=data.qpos[:3].copy(),
-            quat_wxyz=data.qpos[3:7].copy(),
-            linear_velocity_w=data.qvel[:3].copy(),
-            angular_velocity_b=data.qvel[3:6].copy(),
-            q=self._simulation.q,
-            v=self._simulation.v,
-            contacts=self._simulation.read().contacts,
-            gait=episode.task.gait,
-            phase=episode.phase,
-            command=episode.filtered_command,
-        )
+        return self._observer.state(self._simulation, self._running("state"))
 
     def expert_action(self) -> np.ndarray:
         """The expert's action for the present state, float32, shape (12,). Changes nothing, here or later."""
@@ -302,13 +284,6 @@ class Go1Env(gymnasium.Env):
         if self._episode is None:
             raise ResetNeeded(f"call reset() before {what}")
         return self._episode
-
-    def _ended(self, state: RobotState) -> str:
-        if not self._simulation.stable:
-            return "unstable"
-        if state.position_w[2] < FALLEN_HEIGHT or -state.gravity_b[2] < FALLEN_COSINE:
-            return "fall"
-        return "time" if self._running("step").steps >= self._episode_steps else ""
 
     def _info(self, terms: dict[str, float], ended: str, state: RobotState) -> dict[str, Any]:
         episode = self._running("info")

@@ -1,4 +1,4 @@
-"""From the robot's state to the observation: readings, noise, and the memory of earlier frames."""
+"""What experts and students see: the true state, and the observation with its noise and memory."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from go1_mtl_gym.state import RobotState
 
 
 class Observer:
-    """Makes observations.
+    """Makes states and observations.
 
     Args:
         layout: which parts there are.
@@ -21,6 +21,23 @@ class Observer:
         self._layout = layout
         self._noise = noise
         self._tasks = tasks
+
+    @staticmethod
+    def state(simulation: Simulation, episode: Episode) -> RobotState:
+        """All that an expert may read, now."""
+        data = simulation.data
+        return RobotState(
+            position_w=data.qpos[:3].copy(),
+            quat_wxyz=data.qpos[3:7].copy(),
+            linear_velocity_w=data.qvel[:3].copy(),
+            angular_velocity_b=data.qvel[3:6].copy(),
+            q=simulation.q,
+            v=simulation.v,
+            contacts=simulation.read().contacts,
+            gait=episode.task.gait,
+            phase=episode.phase,
+            command=episode.filtered_command,
+        )
 
     def observe(
         self, simulation: Simulation, state: RobotState, episode: Episode, rng: np.random.Generator

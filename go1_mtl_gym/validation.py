@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from numbers import Real
+from typing import Any
 
 import numpy as np
 
@@ -44,7 +45,7 @@ def number_in(value: object, low: float, high: float, what: str) -> float:
     return number
 
 
-def one_of(value: object, allowed: Sequence[str], what: str) -> str:
+def one_of(value: Any, allowed: Sequence[str | None], what: str) -> Any:
     """Return `value` if it is one of `allowed`.
 
     Raises:
@@ -52,4 +53,4 @@ def one_of(value: object, allowed: Sequence[str], what: str) -> str:
     """
     if value not in allowed:
         raise InvalidInputError(f"{what} must be one of {', '.join(map(repr, allowed))}; got {value!r}")
-    return str(value)
+    return value

@@ -9,7 +9,7 @@ import pytest
 
 from experts import MPCConfig
 from go1_mtl_gym import env as environment
-from go1_mtl_gym import episode, robot
+from go1_mtl_gym import episode, robot, termination
 from trainers import MultiHeadPolicy, evaluation, make_env
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -95,8 +95,8 @@ def test_figures_in_the_text_are_the_codes():
     assert f"within {100 * evaluation.STEP_RATE_TOLERANCE:.0f} % of the gait's" in PROSE
     assert f"after the first {evaluation.SETTLE_S:g} s" in PROSE
     assert evaluation.MIN_AIR_SHARE == 0.5 and "at least half of its planned swing" in PROSE
-    assert f"trunk below {environment.FALLEN_HEIGHT} m" in PROSE
-    tilt = np.degrees(np.arccos(environment.FALLEN_COSINE))
+    assert f"trunk below {termination.FALLEN_HEIGHT} m" in PROSE
+    tilt = np.degrees(np.arccos(termination.FALLEN_COSINE))
     assert f"tilted by more than {tilt:.0f} degrees" in PROSE
     assert f"time constant {episode.COMMAND_FILTER_S} s" in PROSE
     hip, thigh, calf = robot.TORQUE_LIMIT[:3]
