@@ -95,7 +95,8 @@ class Go1Env(gymnasium.Env):
             raise InvalidInputError(f"control_hz must be an integer that divides {PHYSICS_HZ}, got {control_hz}")
         for name, size in (("width", width), ("height", height)):
             number_in(size, 16, 8192, f"{name} [pixels]")
-        one_of(render_mode, (*self.metadata["render_modes"], None), "render_mode")
+        if render_mode is not None:
+            one_of(render_mode, self.metadata["render_modes"], "render_mode")
         if not (noise is None or isinstance(noise, (bool, SensorNoise))):
             raise InvalidInputError(f"noise must be None, True, False or a SensorNoise, got {noise!r}")
         self.control_hz = int(rate)

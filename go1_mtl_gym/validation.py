@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from numbers import Real
-from typing import Any
 
 import numpy as np
 
@@ -45,7 +44,7 @@ def number_in(value: object, low: float, high: float, what: str) -> float:
     return number
 
 
-def one_of(value: Any, allowed: Sequence[str | None], what: str) -> Any:
+def one_of(value: object, allowed: Sequence[str], what: str) -> str:
     """Return `value` if it is one of `allowed`.
 
     Raises:
@@ -53,4 +52,4 @@ def one_of(value: Any, allowed: Sequence[str | None], what: str) -> Any:
     """
     if value not in allowed:
         raise InvalidInputError(f"{what} must be one of {', '.join(map(repr, allowed))}; got {value!r}")
-    return value
+    return str(value)
