@@ -186,3 +186,22 @@ def test_observation_and_info_are_not_shared_with_the_environment():
     again, *_, other = env.step(np.zeros(12))
     np.testing.assert_array_equal(again[34:68], kept[:34])
     assert (other["command"] != 9.0).all() and (np.abs(env.state.q) < 5).all()
+
+
+def test_the_expert_is_told_the_gains_and_the_control_period_and_answers_in_radians():
+    told = []
+
+    class Fixed:
+        def __init__(self, gains, hold_s):
+            told.append((gains.kp, gains.kd, hold_s))
+
+        def reset(self, state):
+            told.append(state.phase)
+
+        def action(self, state):
+            return robot.HOME_POSE
+
+    env = Go1Env("trot", expert=Fixed, control_hz=250, kp=30.0, kd=1.0)
+    env.reset(seed=0)
+    np.testing.assert_allclose(env.action_map.to_radians(env.expert_action()), robot.HOME_POSE, atol=1e-6)
+    assert told == [(30.0, 1.0, 0.004), 0.0]
