@@ -13,7 +13,6 @@ import json
 import shlex
 import sys
 import time
-from collections.abc import Callable
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -33,7 +32,7 @@ from go1_mtl_gym.rendering import RenderingError
 from trainers.checkpoint import versions
 from trainers.files import json_ready, write_json
 
-LEARNERS = ("multi_head", "pooled", "paper_literal")
+BASELINES = ("pooled", "paper_literal")
 PICTURE = {"width": 280, "height": 210, "fps": 25}
 
 
@@ -134,14 +133,13 @@ class Job:
                 if trainer.round_num == 0:
                     self._watch(policy, held_out, 0)
                 while trainer.round_num < config.rounds:
-                    rows = trainer.collect_round()
-                    train = trainers.Demonstrations.concatenate([train, rows])
+                    trainer.collect_round()
                     trainer.train_round()
                     self._watch(trainer.policy, held_out, trainer.round_num)
         finally:
             with suppress(EOFError, OSError):  # after Ctrl-C its processes may be gone already
                 venv.close()
-        self._everything(train)
+        self._everything(trainer.rows)
         return trainer.policy
 
     def _everything(self, rows: trainers.Demonstrations) -> None:
@@ -158,7 +156,7 @@ class Job:
 
     def baselines(self) -> dict[str, Any]:
         """The pooled and the paper-literal student, on the same rows with as many gradient steps, side by side."""
-        names = [name for name in LEARNERS[1:] if not (name == "paper_literal" and self._is_literal)]
+        names = [name for name in BASELINES if not (name == "paper_literal" and self._is_literal)]
         missing = [name for name in names if not self._path(name).is_file()]
         if missing:
             jobs = min(len(missing), self.config.n_envs) if self.config.device == "cpu" else 1
@@ -274,7 +272,7 @@ def _read_json(path: Path) -> Any:
     return json.loads(path.read_text()) if path.is_file() else None
 
 
-def main(arguments: list[str] | None = None, announce: Callable[[str], None] = print) -> int:
+def main(arguments: list[str] | None = None) -> int:
     """Run the job from the command line; returns the exit status."""
     out = Path("runs") / time.strftime("%Y-%m-%d_%H-%M-%S")
     try:
@@ -282,14 +280,14 @@ def main(arguments: list[str] | None = None, announce: Callable[[str], None] = p
         out = Path(folder or out)
         metrics = Job(config, out).run()
     except KeyboardInterrupt:
-        announce(f"\ninterrupted; what is done is kept, go on with: --out {out}")
+        print(f"\ninterrupted; what is done is kept, go on with: --out {out}")
         return 130
     except Go1Error as error:
-        announce(f"error: {error}")
+        print(f"error: {error}")
         return 2
     table = trainers.results_table(metrics)
     (out / "table.md").write_text(table + "\n")
-    announce(f"\n{table}\n\nresults in {out}; watch the training with: tensorboard --logdir {out / 'tensorboard'}")
+    print(f"\n{table}\n\nresults in {out}; watch the training with: tensorboard --logdir {out / 'tensorboard'}")
     return 0
 
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from experts.planar import carried, turned
 from go1_mtl_gym import robot
 from go1_mtl_gym.state import RobotState
 
@@ -39,11 +40,9 @@ class FootholdRule:
         stance_s = state.gait.stance_s
         vx, vy, yaw_rate = state.command
         yaw = state.rpy[2]
-        cos, sin = np.cos(yaw), np.sin(yaw)
-        velocity_ref = np.array([cos * vx - sin * vy, sin * vx + cos * vy])
-        turned = yaw + yaw_rate * touchdown_s
-        arm = _turned(robot.NOMINAL_FOOT_B[:, :2], turned)
-        hip_velocity = velocity_ref + yaw_rate * np.stack([-arm[..., 1], arm[..., 0]], axis=-1)
+        velocity_ref = turned(np.array([vx, vy]), yaw)
+        arm = turned(robot.NOMINAL_FOOT_B[:, :2], yaw + yaw_rate * touchdown_s)
+        hip_velocity = velocity_ref + carried(arm, yaw_rate)
         step = hip_velocity * (stance_s / 2) + self.velocity_gain * (com_velocity_w[:2] - velocity_ref)
         step *= np.minimum(1.0, self.reach / np.maximum(np.linalg.norm(step, axis=-1, keepdims=True), 1e-9))
         feet = np.full((*touchdown_s.shape, 3), robot.FOOT_RADIUS)
@@ -73,9 +72,3 @@ class FootholdRule:
         planned = self.plan(state, com_w, com_velocity_w, touchdown_s)
         present = (touchdown_s <= 0.0)[..., None]
         return np.where(present, feet_w, planned)
-
-
-def _turned(arm: np.ndarray, yaw: np.ndarray) -> np.ndarray:
-    """Arms (4, 2) turned by angles (..., 4); shape (..., 4, 2)."""
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    return np.stack([cos * arm[:, 0] - sin * arm[:, 1], sin * arm[:, 0] + cos * arm[:, 1]], axis=-1)

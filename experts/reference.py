@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from experts.nominal import NominalMotion
+from experts.planar import turned
 from go1_mtl_gym.state import RobotState
 
 
@@ -47,21 +48,18 @@ def body_reference(
         steps: N.
     """
     time = np.arange(steps + 1) * dt
-    vx, vy, yaw_rate = state.command
+    yaw_rate = state.command[2]
     yaw = state.rpy[2] + yaw_rate * time
-    cos, sin = np.cos(yaw), np.sin(yaw)
     deviation, rate = motion.at(state.phase + time / state.gait.period)
 
-    velocity_w = np.stack([cos * vx - sin * vy, sin * vx + cos * vy, rate[:, 2]], axis=1)
+    velocity_w = np.column_stack([turned(state.command[:2], yaw), rate[:, 2]])
     position_w = np.empty((steps + 1, 3))
     position_w[0, :2] = com_w[:2]
     position_w[1:, :2] = com_w[:2] + np.cumsum((velocity_w[1:, :2] + velocity_w[:-1, :2]) * (dt / 2), axis=0)
     position_w[:, 2] = com_height + deviation[:, 2]
-    roll, pitch = deviation[:, 0], deviation[:, 1]
-    roll_rate, pitch_rate = rate[:, 0], rate[:, 1]
-    omega_w = np.stack(
-        [cos * roll_rate - sin * pitch_rate, sin * roll_rate + cos * pitch_rate, np.full(steps + 1, yaw_rate)], axis=1
-    )
     return BodyReference(
-        rpy=np.stack([roll, pitch, yaw], axis=1), com_w=position_w, omega_w=omega_w, velocity_w=velocity_w
+        rpy=np.column_stack([deviation[:, :2], yaw]),
+        com_w=position_w,
+        omega_w=np.column_stack([turned(rate[:, :2], yaw), np.full(steps + 1, yaw_rate)]),
+        velocity_w=velocity_w,
     )

@@ -6,6 +6,7 @@ import numpy as np
 
 from experts.footholds import FootholdRule
 from experts.model import Dynamics
+from experts.planar import carried
 from go1_mtl_gym import robot
 from go1_mtl_gym.state import RobotState
 
@@ -38,11 +39,8 @@ class SwingRule:
         remaining = (1.0 - progress) * gait.swing_s
         s = np.minimum(progress / (1.0 - self.early), 1.0)
         landing = footholds.plan(state, dynamics.com_w, dynamics.com_velocity_w, remaining)
-        yaw_rate = state.command[2]
-        body_velocity = dynamics.com_velocity_w[:2]
         arm = landing[:, :2] - dynamics.com_w[:2]
-        stride = body_velocity + yaw_rate * np.stack([-arm[:, 1], arm[:, 0]], axis=1)
-        stride = stride * gait.period
+        stride = (dynamics.com_velocity_w[:2] + carried(arm, state.command[2])) * gait.period
 
         left, rate, curvature = _quintic(s)
         height, climb, bend = _hump(s)

@@ -107,7 +107,6 @@ class Go1Env(gymnasium.Env):
         self.observation_space = Box(self.layout.low, self.layout.high, dtype=np.float32)
         self.action_space = Box(-1.0, 1.0, (12,), dtype=np.float32)
         self.render_mode = render_mode
-        self.metadata = self.metadata | {"render_fps": min(self.control_hz, 50)}
         self._observer = Observer(self.layout, SensorNoise() if noise is True else (noise or None), self.tasks)
         self._episode_steps = round(number_in(episode_s, 1.0 / rate, 1e6, "episode_s") * control_hz)
         self._simulation = Simulation(self.gains)

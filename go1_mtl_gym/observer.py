@@ -33,7 +33,7 @@ class Observer:
             angular_velocity_b=data.qvel[3:6].copy(),
             q=simulation.q,
             v=simulation.v,
-            contacts=simulation.read().contacts,
+            contacts=simulation.contacts,
             gait=episode.task.gait,
             phase=episode.phase,
             command=episode.filtered_command,

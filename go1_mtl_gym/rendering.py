@@ -2,7 +2,6 @@
 
 import os
 import sys
-from typing import Protocol
 
 import mujoco
 import numpy as np
@@ -22,16 +21,6 @@ ARROW_S = 0.6
 
 class RenderingError(Go1Error, RuntimeError):
     """No picture can be drawn on this machine."""
-
-
-class Drawing(Protocol):
-    """What the environment asks of a renderer."""
-
-    def draw(self, state: RobotState) -> np.ndarray | None:
-        """Draw the present state."""
-
-    def close(self) -> None:
-        """Free the resources."""
 
 
 def annotate(scene: mujoco.MjvScene, simulation: Simulation, state: RobotState) -> None:

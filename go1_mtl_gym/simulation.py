@@ -104,6 +104,11 @@ class Simulation:
         return self.data.geom_xpos[self._foot_geom].copy()
 
     @property
+    def contacts(self) -> np.ndarray:
+        """Which feet press on the ground, bool, shape (4,)."""
+        return self.data.sensordata[self._touch] > CONTACT_FORCE
+
+    @property
     def stable(self) -> bool:
         """False once the physics has diverged (a non-finite or huge position, velocity or acceleration)."""
         warned = any(self.data.warning[kind].number for kind in _UNSTABLE)
@@ -115,7 +120,7 @@ class Simulation:
         return Reading(
             accelerometer=values[self._sensor["accelerometer"]].copy(),
             gyroscope=values[self._sensor["gyroscope"]].copy(),
-            contacts=values[self._touch] > CONTACT_FORCE,
+            contacts=self.contacts,
         )
 
     def snapshot(self) -> np.ndarray:

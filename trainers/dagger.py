@@ -131,6 +131,11 @@ class DAggerTrainer(imitation_dagger.DAggerTrainer):
                 callback(self, self.round_num)
         return self.policy
 
+    @property
+    def rows(self) -> Demonstrations:
+        """All rows so far: the base and every round collected."""
+        return Demonstrations.concatenate([self.base, *self._rounds])
+
     def collect_round(self, seconds_per_task: float | None = None) -> Demonstrations:
         """Record the present round, or read it if it was recorded before.
 
@@ -169,7 +174,7 @@ class DAggerTrainer(imitation_dagger.DAggerTrainer):
             self.policy.load_state_dict(MultiHeadPolicy.load(path, self.policy.device).state_dict())
             self.bc_trainer.steps_done += self.bc_trainer.config.steps
         else:
-            data = Demonstrations.concatenate([self.base, *self._rounds])
+            data = self.rows
             self.logger.record("dagger/round", self.round_num)
             self.logger.record("dagger/rows", len(data))
             seed = derive_seed("round", self.bc_trainer.config.seed, self.round_num)

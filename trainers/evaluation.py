@@ -202,9 +202,7 @@ def _run(
     act = controller(policy_or_expert, base)
     rng = np.random.default_rng(derive_seed("commands", seed))
     options = {"task": task} | ({} if command is None else {"command": command})
-    obs, info = env.reset(seed=seed, options=options)
-    if hasattr(policy_or_expert, "reset") and not hasattr(policy_or_expert, "predict"):
-        policy_or_expert.reset(base.state)
+    obs, info = begin(env, policy_or_expert, seed, options)
     given = [tuple(float(value) for value in info["command"])]
     steps = round(seconds * base.control_hz)
     every = round(command_interval * base.control_hz) if command_interval else steps
@@ -266,6 +264,14 @@ def controller(policy_or_expert: Any, env: Any) -> Callable[[np.ndarray], np.nda
     raise InvalidInputError(
         f'expected something with predict(obs), something with action(state), or "expert"; got {policy_or_expert!r}'
     )
+
+
+def begin(env: Any, policy_or_expert: Any, seed: int, options: dict[str, Any]) -> tuple[np.ndarray, dict[str, Any]]:
+    """Reset an environment, and an expert that is no policy with it; returns observation and info."""
+    obs, info = env.reset(seed=seed, options=options)
+    if hasattr(policy_or_expert, "reset") and not hasattr(policy_or_expert, "predict"):
+        policy_or_expert.reset(env.unwrapped.state)
+    return obs, info
 
 
 def _mean(values: Sequence[float] | np.ndarray) -> float:

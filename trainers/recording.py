@@ -11,7 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from go1_mtl_gym.errors import InvalidInputError
 from trainers.environments import make_env
-from trainers.evaluation import controller
+from trainers.evaluation import begin, controller
 from trainers.files import write_atomically
 
 COLOURS = 128
@@ -78,9 +78,7 @@ def record_frames(
 def _film(env: Any, policy_or_expert: Any, options: dict[str, Any], seed: int, count: int, fps: int) -> np.ndarray:
     base = env.unwrapped
     act = controller(policy_or_expert, base)
-    obs, _ = env.reset(seed=seed, options=options)
-    if hasattr(policy_or_expert, "reset") and not hasattr(policy_or_expert, "predict"):
-        policy_or_expert.reset(base.state)
+    obs, _ = begin(env, policy_or_expert, seed, options)
     frames = [_averaged(env.render())]
     step, terminated = 0, False
     while len(frames) < count:
