@@ -12,11 +12,12 @@ from gymnasium.spaces import Box
 
 from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import ActionMap, PDGains
+from go1_mtl_gym.arguments import check_control_hz, check_noise, check_phase, check_rendering, check_reset_options
 from go1_mtl_gym.episode import Episode
-from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.expert_hook import DEFAULT_EXPERT, check_expert, load_expert
 from go1_mtl_gym.observation import ObservationLayout, SensorNoise
 from go1_mtl_gym.observer import Observer
+from go1_mtl_gym.registration import register_task
 from go1_mtl_gym.rewards import reward_terms
 from go1_mtl_gym.simulation import PHYSICS_HZ, Simulation
 from go1_mtl_gym.state import RobotState
@@ -43,13 +44,14 @@ class Go1Env(gymnasium.Env):
     than 60 degrees) or when the physics diverges; truncates after `episode_s`.
 
     Info: task, command (asked for), filtered_command (seen by expert and student), base_velocity (measured vx, vy, yaw
-    rate in the heading frame), contacts, phase, reward_terms, fallen, ended ("", "fall", "unstable" or "time").
+    rate in the heading frame), contacts, phase, standing, reward_terms, fallen, ended ("", "fall", "unstable" or
+    "time").
 
     Version history: v0, first.
 
     Args:
         task: name of the task, or None to draw one per episode.
-        tasks: names of the tasks in the one-hot id, in order.
+        tasks: names of the tasks in the one-hot id, in order; None means all that are registered now.
         channels: optional parts of the observation: "command", "gravity", "phase", "last_action".
         history: number of proprioceptive frames in the observation.
         control_hz: rate of `step` [Hz]; a divisor of 1000 from 50 to 1000.
@@ -73,7 +75,7 @@ class Go1Env(gymnasium.Env):
         self,
         task: str | None = "trot",
         *,
-        tasks: Sequence[str] = tuple(TASKS),
+        tasks: Sequence[str] | None = None,
         channels: Sequence[str] = (),
         history: int = 1,
         control_hz: int = 50,
@@ -87,19 +89,11 @@ class Go1Env(gymnasium.Env):
         height: int = 480,
     ) -> None:
         self._arguments = {name: value for name, value in locals().items() if name not in ("self", "__class__")}
-        self.tasks = check_task_names(tasks)
+        self.tasks = self._arguments["tasks"] = check_task_names(tuple(TASKS) if tasks is None else tasks)
         if task is not None:
             one_of(task, self.tasks, "task")
-        rate = number_in(control_hz, 50, PHYSICS_HZ, "control_hz")
-        if rate % 1 or PHYSICS_HZ % rate:
-            raise InvalidInputError(f"control_hz must be an integer that divides {PHYSICS_HZ}, got {control_hz}")
-        for name, size in (("width", width), ("height", height)):
-            number_in(size, 16, 8192, f"{name} [pixels]")
-        if render_mode is not None:
-            one_of(render_mode, self.metadata["render_modes"], "render_mode")
-        if not (noise is None or isinstance(noise, (bool, SensorNoise))):
-            raise InvalidInputError(f"noise must be None, True, False or a SensorNoise, got {noise!r}")
-        self.control_hz = int(rate)
+        self.control_hz = check_control_hz(control_hz)
+        check_rendering(render_mode, self.metadata["render_modes"], width, height)
         self.control_s = 1.0 / self.control_hz
         self.gains = PDGains(kp, kd)
         self.action_map = ActionMap.for_gains(self.gains)
@@ -107,8 +101,8 @@ class Go1Env(gymnasium.Env):
         self.observation_space = Box(self.layout.low, self.layout.high, dtype=np.float32)
         self.action_space = Box(-1.0, 1.0, (12,), dtype=np.float32)
         self.render_mode = render_mode
-        self._observer = Observer(self.layout, SensorNoise() if noise is True else (noise or None), self.tasks)
-        self._episode_steps = round(number_in(episode_s, 1.0 / rate, 1e6, "episode_s") * control_hz)
+        self._observer = Observer(self.layout, check_noise(noise, SensorNoise, "noise"), self.tasks)
+        self._episode_steps = round(number_in(episode_s, self.control_s, 1e6, "episode_s") * self.control_hz)
         self._simulation = Simulation(self.gains)
         self._make_expert = check_expert(expert)
         self._expert: Any = None
@@ -128,19 +122,13 @@ class Go1Env(gymnasium.Env):
         Raises:
             InvalidInputError: for an unknown option, task or impossible command; the running episode is left as it is.
         """
-        options = dict(options or {})
-        for name in options:
-            one_of(name, ("command", "task"), "reset option")
-        if options.get("task") is not None:
-            one_of(options["task"], self.tasks, "task")
-        if options.get("command") is not None:
-            TASKS[options.get("task") or self._arguments["task"] or self.tasks[0]].check_command(options["command"])
+        name, command = check_reset_options(options, self.tasks, self._arguments["task"])
         super().reset(seed=seed)
-        task = TASKS[options.get("task") or self._arguments["task"] or str(self.np_random.choice(self.tasks))]
+        task = TASKS[name or str(self.np_random.choice(self.tasks))]
         drawn = task.draw_command(self.np_random)
         self._episode = Episode(
             task=task,
-            command=drawn if options.get("command") is None else task.check_command(options["command"]),
+            command=drawn if command is None else command,
             last_action=self.action_map.from_radians(robot.HOME_POSE),
             older_frames=deque(maxlen=self.layout.history - 1),
         )
@@ -230,15 +218,20 @@ class Go1Env(gymnasium.Env):
             self._expert.reset(state)
         return self.action_map.from_radians(self._expert.action(state)).astype(np.float32)
 
-    def set_task(self, task: str) -> None:
-        """Change the task while running; the gait clock's phase and the command go on.
+    def set_task(self, task: str, phase: float | None = None) -> None:
+        """Change the task while running; the command goes on.
+
+        Args:
+            task: name of the new one.
+            phase: of its gait [cycles], in [0, 1); None keeps the clock's.
 
         Raises:
-            InvalidInputError: if the task is unknown here, or does not allow the present command.
+            InvalidInputError: if the task is unknown here, does not allow the present command, or the phase is none.
         """
         episode = self._running("set_task")
         new = TASKS[one_of(task, self.tasks, "task")]
         new.check_command(episode.command)
+        episode.phase = episode.phase if phase is None else check_phase(phase)
         episode.task = new
 
     def set_command(self, command: Sequence[float]) -> None:
@@ -264,6 +257,7 @@ class Go1Env(gymnasium.Env):
     def __getstate__(self) -> dict[str, Any]:
         """Arguments and running state; a copy continues to the bit, without the original's window or expert."""
         return {
+            "registered": tuple(TASKS[name] for name in self.tasks),
             "arguments": self._arguments,
             "episode": copy.deepcopy(self._episode),
             "snapshot": self._simulation.snapshot(),
@@ -272,6 +266,8 @@ class Go1Env(gymnasium.Env):
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
+        for task in state["registered"]:  # another process may not know them yet
+            register_task(task)
         self.__init__(**state["arguments"])
         self._simulation.restore(state["snapshot"])
         self._np_random = state["np_random"]
@@ -294,6 +290,7 @@ class Go1Env(gymnasium.Env):
             "base_velocity": np.nan_to_num(state.base_velocity),
             "contacts": state.contacts,
             "phase": episode.phase,
+            "standing": state.standing,
             "reward_terms": terms,
             "fallen": ended in ("fall", "unstable"),
             "ended": ended,

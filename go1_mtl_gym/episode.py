@@ -5,10 +5,28 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from go1_mtl_gym.clock import next_phase
 from go1_mtl_gym.tasks import Task
 
 COMMAND_FILTER_S = 0.2
 """Time constant of the low-pass between a command and what expert and student see of it [s]."""
+COMMAND_SLEW = (4.0, 4.0, 8.0)
+"""Largest change of the filtered command per second: vx, vy [m/s^2], yaw rate [rad/s^2]."""
+
+
+def filtered(command: np.ndarray, before: np.ndarray, seconds: float) -> np.ndarray:
+    """The filtered command after some time: first-order low-pass, then a limit on its slope.
+
+    c' = c + clip((1 - exp(-t / 0.2 s)) (command - c), -COMMAND_SLEW t, COMMAND_SLEW t), each component by itself.
+
+    Args:
+        command: as asked for (vx [m/s], vy [m/s], yaw rate [rad/s]), shape (3,).
+        before: c, the filtered command so far, shape (3,).
+        seconds: t [s].
+    """
+    limit = np.array(COMMAND_SLEW) * seconds
+    share = 1.0 - np.exp(-seconds / COMMAND_FILTER_S)
+    return before + np.clip(share * (command - before), -limit, limit)
 
 
 @dataclass
@@ -23,6 +41,7 @@ class Episode:
         filtered_command: what expert and student see of the command, shape (3,).
         phase: the gait clock [cycles], in [0, 1).
         steps: control periods since the reset.
+        time_s: since the reset [s].
     """
 
     task: Task
@@ -32,10 +51,14 @@ class Episode:
     filtered_command: np.ndarray = field(default_factory=lambda: np.zeros(3))
     phase: float = 0.0
     steps: int = 0
+    time_s: float = 0.0
 
     def advance(self, control_s: float) -> None:
-        """Let one control period [s] pass: clock and command filter move on."""
-        self.phase = (self.phase + control_s / self.task.gait.period) % 1.0
-        share = 1.0 - np.exp(-control_s / COMMAND_FILTER_S)
-        self.filtered_command = self.filtered_command + share * (self.command - self.filtered_command)
+        """Let one control period [s] pass: clock and command filter move on.
+
+        The clock obeys the filtered command that expert and student saw at the beginning of the period.
+        """
+        self.phase = next_phase(self.task.gait, self.phase, self.filtered_command, control_s)
+        self.filtered_command = filtered(self.command, self.filtered_command, control_s)
         self.steps += 1
+        self.time_s = self.steps * control_s

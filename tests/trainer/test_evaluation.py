@@ -47,7 +47,7 @@ def falling(action):
 
 @pytest.mark.parametrize("task", list(TASKS))
 def test_stepping_and_tracking_is_success(task):
-    result = evaluate(Scripted(task), task, **SHORT)
+    result = evaluate(Scripted(task), task, **SHORT, tasks=tuple(TASKS))
     assert result.survival_rate == result.success_rate == 1.0 and result.survival_s == 6.0
     assert result.velocity_error < 0.02 and result.yaw_rate_error < 0.02
     assert result.step_rate == pytest.approx(1 / TASKS[task].gait.period, rel=0.15)
