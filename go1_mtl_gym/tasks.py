@@ -104,7 +104,7 @@ def add_task(task: Task) -> bool:
     known = _REGISTRY.get(task.name)
     if known is not None and known != task:
         raise InvalidInputError(f"the name {task.name!r} is taken by another task, {known}; got {task}")
-    _REGISTRY[task.name] = task
+    _REGISTRY.setdefault(task.name, task)
     return known is None
 
 
