@@ -9,6 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
+from go1_mtl_gym.estimator import EstimatorNoise
 from go1_mtl_gym.gaits import GAITS, Gait
 from go1_mtl_gym.observation import ObservationLayout, SensorNoise
 from go1_mtl_gym.perturbation import PerturbationWrapper
@@ -20,6 +21,7 @@ __all__ = [
     "GAITS",
     "PAPER_TASKS",
     "TASKS",
+    "EstimatorNoise",
     "Gait",
     "Go1Env",
     "Go1Error",

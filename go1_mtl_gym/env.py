@@ -14,9 +14,11 @@ from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import ActionMap, PDGains
 from go1_mtl_gym.arguments import check_control_hz, check_noise, check_phase, check_rendering, check_reset_options
 from go1_mtl_gym.episode import Episode
+from go1_mtl_gym.estimator import EstimatorError, EstimatorNoise
 from go1_mtl_gym.expert_hook import DEFAULT_EXPERT, check_expert, load_expert
 from go1_mtl_gym.observation import ObservationLayout, SensorNoise
 from go1_mtl_gym.observer import Observer
+from go1_mtl_gym.realism import Realism
 from go1_mtl_gym.registration import register_task
 from go1_mtl_gym.rewards import reward_terms
 from go1_mtl_gym.simulation import PHYSICS_HZ, Simulation
@@ -58,6 +60,9 @@ class Go1Env(gymnasium.Env):
         kp: stiffness of the actuators [N m/rad].
         kd: damping of the actuators [N m s/rad].
         noise: True for the default `SensorNoise`, or one of your own; None for exact sensors.
+        friction, payload_kg, action_delay_s: differences from the expert's model, see `go1_mtl_gym.realism.Realism`.
+        estimator_noise: True for the default `EstimatorNoise`, or one of your own: the expert then sees
+            `estimated_state`; None shows it the true state.
         episode_s: length of an episode [s].
         expert: ``"module:Class"`` or a callable; called with ``gains=PDGains, hold_s=control period`` on first use,
             must give an object with ``reset(state)`` and ``action(state)``, which returns 12 joint targets [rad] for a
@@ -82,6 +87,10 @@ class Go1Env(gymnasium.Env):
         kp: float = 50.0,
         kd: float = 2.0,
         noise: SensorNoise | bool | None = None,
+        friction: float | None = None,
+        payload_kg: float = 0.0,
+        action_delay_s: float = 0.0,
+        estimator_noise: EstimatorNoise | bool | None = None,
         episode_s: float = 30.0,
         expert: str | Callable[..., Any] = DEFAULT_EXPERT,
         render_mode: str | None = None,
@@ -103,7 +112,8 @@ class Go1Env(gymnasium.Env):
         self.render_mode = render_mode
         self._observer = Observer(self.layout, check_noise(noise, SensorNoise, "noise"), self.tasks)
         self._episode_steps = round(number_in(episode_s, self.control_s, 1e6, "episode_s") * self.control_hz)
-        self._simulation = Simulation(self.gains)
+        self._simulation = Simulation(self.gains, Realism(friction, payload_kg, action_delay_s))
+        self._estimator_noise = check_noise(estimator_noise, EstimatorNoise, "estimator_noise")
         self._make_expert = check_expert(expert)
         self._expert: Any = None
         self._renderer: Any = None
@@ -134,13 +144,15 @@ class Go1Env(gymnasium.Env):
         )
         joint_noise = self.np_random.uniform(-RESET_JOINT_NOISE, RESET_JOINT_NOISE, 12)
         self._simulation.reset(robot.HOME_POSE + joint_noise)
-        state = self.state
+        if self._estimator_noise is not None:
+            self._episode.estimator_error = EstimatorError(self._estimator_noise, int(self.np_random.integers(2**63)))
         if self._expert is not None:
-            self._expert.reset(state)
+            self._expert.reset(self.estimated_state)
+        state = self.state
         observation = self._observer.observe(self._simulation, state, self._episode, self.np_random)
         if self.render_mode == "human":
             self.render()
-        return observation, self._info({}, "", state)
+        return observation, self._episode.info(state, {}, "")
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict]:
         """Hold one action for a control period.
@@ -172,7 +184,7 @@ class Go1Env(gymnasium.Env):
         if self.render_mode == "human":
             self.render()
         terminated = ended in ("fall", "unstable")
-        return observation, sum(terms.values()), terminated, ended == "time", self._info(terms, ended, state)
+        return observation, sum(terms.values()), terminated, ended == "time", episode.info(state, terms, ended)
 
     def render(self) -> np.ndarray | None:
         """Draw the robot, its feet's contacts and its command; an RGB array (height, width, 3) in "rgb_array" mode."""
@@ -207,12 +219,17 @@ class Go1Env(gymnasium.Env):
 
     @property
     def state(self) -> RobotState:
-        """All that an expert may read, now."""
+        """The robot, its clock and its command, now, as they truly are."""
         return self._observer.state(self._simulation, self._running("state"))
 
+    @property
+    def estimated_state(self) -> RobotState:
+        """All that an expert may read, now: `state` with the errors of the `estimator_noise`."""
+        return self._running("estimated_state").estimated(self.state)
+
     def expert_action(self) -> np.ndarray:
-        """The expert's action for the present state, float32, shape (12,). Changes nothing, here or later."""
-        state = self.state
+        """The expert's action for the `estimated_state`, float32, shape (12,). Changes nothing, here or later."""
+        state = self.estimated_state
         if self._expert is None:
             self._expert = load_expert(self._make_expert)(gains=self.gains, hold_s=self.control_s)
             self._expert.reset(state)
@@ -280,18 +297,3 @@ class Go1Env(gymnasium.Env):
         if self._episode is None:
             raise ResetNeeded(f"call reset() before {what}")
         return self._episode
-
-    def _info(self, terms: dict[str, float], ended: str, state: RobotState) -> dict[str, Any]:
-        episode = self._running("info")
-        return {
-            "task": episode.task.name,
-            "command": episode.command.copy(),
-            "filtered_command": episode.filtered_command.copy(),
-            "base_velocity": np.nan_to_num(state.base_velocity),
-            "contacts": state.contacts,
-            "phase": episode.phase,
-            "standing": state.standing,
-            "reward_terms": terms,
-            "fallen": ended in ("fall", "unstable"),
-            "ended": ended,
-        }

@@ -2,10 +2,13 @@
 
 from collections import deque
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from go1_mtl_gym.clock import next_phase
+from go1_mtl_gym.estimator import EstimatorError
+from go1_mtl_gym.state import RobotState
 from go1_mtl_gym.tasks import Task
 
 COMMAND_FILTER_S = 0.2
@@ -42,6 +45,7 @@ class Episode:
         phase: the gait clock [cycles], in [0, 1).
         steps: control periods since the reset.
         time_s: since the reset [s].
+        estimator_error: what the expert's state estimator gets wrong, or None for the true state.
     """
 
     task: Task
@@ -52,6 +56,7 @@ class Episode:
     phase: float = 0.0
     steps: int = 0
     time_s: float = 0.0
+    estimator_error: EstimatorError | None = None
 
     def advance(self, control_s: float) -> None:
         """Let one control period [s] pass: clock and command filter move on.
@@ -62,3 +67,30 @@ class Episode:
         self.filtered_command = filtered(self.command, self.filtered_command, control_s)
         self.steps += 1
         self.time_s = self.steps * control_s
+        if self.estimator_error is not None:
+            self.estimator_error.advance()
+
+    def estimated(self, state: RobotState) -> RobotState:
+        """What the state estimator makes of the true state, now."""
+        return state if self.estimator_error is None else self.estimator_error.estimate(state)
+
+    def info(self, state: RobotState, terms: dict[str, float], ended: str) -> dict[str, Any]:
+        """What `reset` and `step` report.
+
+        Args:
+            state: the true one, now.
+            terms: of the reward.
+            ended: why the episode is over; "" while it goes on.
+        """
+        return {
+            "task": self.task.name,
+            "command": self.command.copy(),
+            "filtered_command": self.filtered_command.copy(),
+            "base_velocity": np.nan_to_num(state.base_velocity),
+            "contacts": state.contacts,
+            "phase": self.phase,
+            "standing": state.standing,
+            "reward_terms": terms,
+            "fallen": ended in ("fall", "unstable"),
+            "ended": ended,
+        }

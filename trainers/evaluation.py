@@ -269,7 +269,7 @@ def controller(policy_or_expert: Any, env: Any) -> Callable[[np.ndarray], np.nda
     if hasattr(policy_or_expert, "predict"):
         return lambda obs: policy_or_expert.predict(obs, deterministic=True)[0]
     if hasattr(policy_or_expert, "action"):
-        return lambda obs: env.action_map.from_radians(policy_or_expert.action(env.state)).astype(np.float32)
+        return lambda obs: env.action_map.from_radians(policy_or_expert.action(_expert_state(env))).astype(np.float32)
     raise InvalidInputError(
         f'expected something with predict(obs), something with action(state), or "expert"; got {policy_or_expert!r}'
     )
@@ -279,8 +279,13 @@ def begin(env: Any, policy_or_expert: Any, seed: int, options: dict[str, Any]) -
     """Reset an environment, and an expert that is no policy with it; returns observation and info."""
     obs, info = env.reset(seed=seed, options=options)
     if hasattr(policy_or_expert, "reset") and not hasattr(policy_or_expert, "predict"):
-        policy_or_expert.reset(env.unwrapped.state)
+        policy_or_expert.reset(_expert_state(env.unwrapped))
     return obs, info
+
+
+def _expert_state(env: Any) -> Any:
+    """What the environment shows an expert."""
+    return env.estimated_state if hasattr(env, "estimated_state") else env.state
 
 
 def _mean(values: Sequence[float] | np.ndarray) -> float:
