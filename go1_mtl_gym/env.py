@@ -32,7 +32,7 @@ RESET_JOINT_NOISE = 0.03
 
 
 class Go1Env(gymnasium.Env):
-    """A Unitree Go1 that walks, trots, bounds or jumps on command.
+    """A Unitree Go1 that moves in the gait of a task, as told by a command.
 
     Observation: a flat float32 Box of 34 raw proprioceptive numbers, the channels asked for, and the one-hot task id;
     the table is in `go1_mtl_gym.observation`.

@@ -117,6 +117,7 @@ def test_refused_calls_change_nothing(call, words):
         lambda env: env.step(np.zeros(12)),
         lambda env: env.expert_action(),
         lambda env: env.state,
+        lambda env: env.estimated_state,
         lambda env: env.task,
         lambda env: env.set_task("walk"),
         lambda env: env.set_command((0.1, 0, 0)),

@@ -12,21 +12,16 @@ import go1_mtl_gym
 from go1_mtl_gym import TASKS, Gait, Task, env_id, register_task
 from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.tasks import _REGISTRY
 from trainers import CollectJob, Demonstrations, collect_all, evaluate, make_venv
 
 AMBLE = Task("amble", Gait("amble", 0.5, 0.65, (0.25, 0.75, 0.0, 0.5)), command_range=(0.4, 0.2, 0.3))
 
 
 @pytest.fixture
-def amble():
-    """A registered task that is forgotten after the test."""
-    before = dict(_REGISTRY), dict(gymnasium.registry)
+def amble(passing_tasks) -> Task:
+    """A registered task."""
     register_task(AMBLE)
-    yield AMBLE
-    for registry, kept in zip((_REGISTRY, gymnasium.registry), before):
-        registry.clear()
-        registry.update(kept)
+    return AMBLE
 
 
 def test_a_registered_task_is_everywhere(amble):
@@ -39,15 +34,12 @@ def test_a_registered_task_is_everywhere(amble):
     assert env.state.gait is amble.gait
 
 
-def test_environments_made_before_keep_their_tasks():
+def test_environments_made_before_keep_their_tasks(passing_tasks):
     before = len(TASKS)
     old = Go1Env(None)
     register_task(dataclasses.replace(AMBLE, name="late"))
-    try:
-        assert len(old.tasks) == before and "late" not in pickle.loads(pickle.dumps(old)).tasks
-        assert len(Go1Env(None).tasks) == before + 1
-    finally:
-        del _REGISTRY["late"], gymnasium.registry["Go1Late-v0"]
+    assert len(old.tasks) == before and "late" not in pickle.loads(pickle.dumps(old)).tasks
+    assert len(Go1Env(None).tasks) == before + 1
 
 
 def test_equal_tasks_may_be_registered_again_and_others_of_the_name_may_not(amble):
