@@ -29,6 +29,11 @@ class Dynamics:
         com_w: centre of mass, world [m], shape (3,).
         com_velocity_w: world [m/s], shape (3,).
         inertia_w: composite inertia about the centre of mass, world axes [kg m^2], shape (3, 3).
+        mean_omega_w: angular velocity of the whole robot, trunk and legs: I^-1 times its angular momentum about the
+            centre of mass, world [rad/s], shape (3,).
+        lean_w: rotation of the whole robot against the trunk's, I^-1 A_joints (q - q_home), world [rad], shape (3,);
+            its rate is, to first order, mean_omega_w less the trunk's angular velocity (Y.-M. Chen et al., 2023, call
+            such a frame an integrable whole-body orientation).
     """
 
     v: np.ndarray
@@ -41,6 +46,8 @@ class Dynamics:
     com_w: np.ndarray
     com_velocity_w: np.ndarray
     inertia_w: np.ndarray
+    mean_omega_w: np.ndarray
+    lean_w: np.ndarray
 
 
 def to_pinocchio(state: RobotState) -> tuple[np.ndarray, np.ndarray]:
@@ -89,6 +96,9 @@ class RobotModel:
             drift[leg] = pin.getFrameClassicalAcceleration(model, data, frame, pin.LOCAL_WORLD_ALIGNED).linear
             feet_w[leg] = data.oMf[frame].translation
         upper = np.triu(data.M)
+        inertia = data.Ig.inertia.copy()
+        turning = np.column_stack([data.hg.angular, data.Ag[3:, 6:] @ (state.q - robot.HOME_POSE)])
+        mean_omega, lean = np.linalg.solve(inertia, turning).T
         return Dynamics(
             v=v,
             mass_matrix=upper + np.triu(upper, 1).T,
@@ -99,5 +109,7 @@ class RobotModel:
             feet_velocity_w=(jacobian @ v).reshape(4, 3),
             com_w=data.com[0].copy(),
             com_velocity_w=data.vcom[0].copy(),
-            inertia_w=data.Ig.inertia.copy(),
+            inertia_w=inertia,
+            mean_omega_w=mean_omega,
+            lean_w=lean,
         )

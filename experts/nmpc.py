@@ -21,6 +21,7 @@ By default nothing is remembered from call to call but counters, so the action i
 """
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
@@ -39,6 +40,8 @@ from go1_mtl_gym.actuation import PDGains
 from go1_mtl_gym.state import RobotState
 from go1_mtl_gym.validation import number_in, one_of
 
+SHORTEST_PIECE_S = 1e-3
+"""Contact changes closer than this to each other or to the ends of a hold are taken as one [s]."""
 SETTLED = 0.1
 """Sequential quadratic programming ends when no force of the first interval moves by more than this [N]."""
 
@@ -154,10 +157,15 @@ class NMPCExpert:
         forces = self.forces(state, dynamics)
         if state.standing:
             return self._whole_body(dynamics, forces, np.ones(4, bool), np.zeros((4, 3)))
-        half = self.hold_s / 2
         velocity_w = self.mean_velocity(state, dynamics)
-        swing = self.config.swing.acceleration(state, half, dynamics, velocity_w, self.config.footholds)
-        return self._whole_body(dynamics, forces, state.gait.stance(state.phase + half / state.gait.period), swing)
+        torque, acceleration = np.zeros(12), np.zeros(12)
+        for middle_s, share in contact_pieces(state, self.hold_s):
+            stance = state.gait.stance(state.phase + middle_s / state.gait.period)
+            swing = self.config.swing.acceleration(state, middle_s, dynamics, velocity_w, self.config.footholds)
+            part = self._whole_body(dynamics, forces, stance, swing)
+            torque += share * part[0]
+            acceleration += share * part[1]
+        return torque, acceleration
 
     def forces(self, state: RobotState, dynamics: Dynamics) -> np.ndarray:
         """Ground forces of the present interval, world [N], shape (4, 3)."""
@@ -176,7 +184,8 @@ class NMPCExpert:
         steps = config.mpc.steps
         dt = gait.period / steps
         motion = self.motion(state)
-        reference = body_reference(state, dynamics.com_w, motion, config.com_height, dt, steps)
+        attitude = whole_body_attitude(state, dynamics)
+        reference = body_reference(state, attitude[2], dynamics.com_w, motion, config.com_height, dt, steps)
         middle = state.phase + (np.arange(steps) + 0.5) / steps
         contact = np.ones((steps, 4)) if state.standing else gait.contact_schedule(state.phase, dt, steps)
         velocity_w = self.mean_velocity(state, dynamics)
@@ -185,8 +194,7 @@ class NMPCExpert:
         sideways = to_complex(nominal) * turn(reference[:-1, 2:3])
         nominal[..., 0], nominal[..., 1] = sideways.real, sideways.imag
         nominal = nominal.reshape(steps, 12)
-        omega_w = state.rotation @ state.angular_velocity_b
-        x0 = np.concatenate([state.rpy, dynamics.com_w, omega_w, dynamics.com_velocity_w])
+        x0 = np.concatenate([attitude, dynamics.com_w, dynamics.mean_omega_w, dynamics.com_velocity_w])
         inertia_b = state.rotation.T @ dynamics.inertia_w @ state.rotation
 
         states, inputs = reference, nominal
@@ -216,6 +224,25 @@ class NMPCExpert:
         if state.standing:
             return standing_motion(state.gait)
         return nominal_motion(state.gait, self._standing_inertia, self.config.com_height - robot.FOOT_RADIUS)
+
+
+def whole_body_attitude(state: RobotState, dynamics: Dynamics) -> np.ndarray:
+    """Roll, pitch, yaw [rad] of trunk and legs together, for small angles between the two, shape (3,)."""
+    lean = to_complex(dynamics.lean_w) * turn(-state.rpy[2])
+    return state.rpy + np.array([lean.real, lean.imag, dynamics.lean_w[2]])
+
+
+def contact_pieces(state: RobotState, hold_s: float) -> list[tuple[float, float]]:
+    """The parts of a hold between which feet touch down or lift off: middle [s] and share of the hold of each."""
+    gait = state.gait
+    leg = gait.leg_phase(state.phase)
+    edges = np.concatenate([(gait.duty - leg) % 1.0, 1.0 - leg]) * gait.period
+    cuts = [0.0]
+    for edge in sorted(edges[edges < hold_s - SHORTEST_PIECE_S].tolist()):
+        if edge > cuts[-1] + SHORTEST_PIECE_S:
+            cuts.append(edge)
+    cuts.append(hold_s)
+    return [((a + b) / 2, (b - a) / hold_s if hold_s else 1.0) for a, b in pairwise(cuts)]
 
 
 def _plausible(state: RobotState) -> bool:

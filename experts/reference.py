@@ -8,7 +8,7 @@ from go1_mtl_gym.state import RobotState
 
 
 def body_reference(
-    state: RobotState, com_w: np.ndarray, motion: NominalMotion, com_height: float, dt: float, steps: int
+    state: RobotState, yaw: float, com_w: np.ndarray, motion: NominalMotion, com_height: float, dt: float, steps: int
 ) -> np.ndarray:
     """Integrate the command over the horizon.
 
@@ -17,6 +17,7 @@ def body_reference(
 
     Args:
         state: the robot now.
+        yaw: its heading [rad].
         com_w: its centre of mass, world [m], shape (3,).
         motion: the gait's nominal motion, or that of standing.
         com_height: mean height of the centre of mass [m].
@@ -30,7 +31,7 @@ def body_reference(
     time = np.arange(steps + 1) * dt
     vx, vy, yaw_rate = state.command.tolist()
     deviation = motion.at(state.phase + time / state.gait.period)
-    yaw = state.rpy[2] + yaw_rate * time
+    yaw = yaw + yaw_rate * time
     heading = turn(yaw)
     sway, swaying, rolling = (to_complex(deviation[:, at : at + 2]) * heading for at in (3, 9, 6))
     velocity = complex(vx, vy) * heading
