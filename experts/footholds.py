@@ -50,7 +50,7 @@ class FootholdRule:
         heading = turn(state.rpy[2])
         velocity, velocity_ref = to_complex(velocity_w), complex(vx, vy) * heading
         arm = to_complex(state.gait.nominal_feet_b) * heading * turn(yaw_rate * touchdown_s)
-        step = (velocity_ref + carried(arm, yaw_rate)) * (state.gait.stance_s / 2)
+        step = (velocity + carried(arm, yaw_rate)) * (state.gait.stance_s / 2)
         step += self.velocity_gain * (velocity - velocity_ref)
         step *= np.minimum(1.0, self.reach / np.maximum(np.abs(step), 1e-9))
         point = to_complex(com_w) + velocity * touchdown_s + arm + step

@@ -25,7 +25,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from experts.dynamics import FORCE_UNIT, linearise
+from experts.dynamics import COM, FORCE_UNIT, RPY, linearise
 from experts.footholds import FootholdRule
 from experts.model import Dynamics, RobotModel
 from experts.mpc import LARGEST, MPC, MPCConfig, Solution
@@ -42,8 +42,6 @@ from go1_mtl_gym.validation import number_in, one_of
 
 SHORTEST_PIECE_S = 1e-3
 """Contact changes closer than this to each other or to the ends of a hold are taken as one [s]."""
-SETTLED = 0.1
-"""Sequential quadratic programming ends when no force of the first interval moves by more than this [N]."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +52,8 @@ class NMPCConfig:
         com_height: mean height of the centre of mass [m].
         linearisation: "reference", or "shifted" for real-time iterations, which remember the last solution.
         sqp_iterations: most QPs per call.
+        sqp_tolerance: a QP whose solution is as near as this to the trajectory that it was linearised along is the
+            last: attitude [rad], and position in units of `com_height`.
         whole_body: how forces become torques: a name from `experts.whole_body.WHOLE_BODY`.
         mpc_hz: rate at which forces are planned anew [Hz], the whole body being solved at every call; None plans at
             every call. With a rate the expert remembers its plan.
@@ -67,7 +67,8 @@ class NMPCConfig:
 
     com_height: float = 0.28
     linearisation: str = "reference"
-    sqp_iterations: int = 1
+    sqp_iterations: int = 3
+    sqp_tolerance: float = 0.1
     whole_body: str = "closed_form"
     mpc_hz: float | None = None
     mpc: MPCConfig = field(default_factory=MPCConfig)
@@ -78,6 +79,7 @@ class NMPCConfig:
         number_in(self.com_height, 0.15, 0.34, "com_height [m]")
         one_of(self.linearisation, ("reference", "shifted"), "linearisation")
         number_in(self.sqp_iterations, 1, 100, "sqp_iterations")
+        number_in(self.sqp_tolerance, 0.0, 10.0, "sqp_tolerance")
         one_of(self.whole_body, tuple(WHOLE_BODY), "whole_body")
         if self.mpc_hz is not None:
             number_in(self.mpc_hz, 10.0, 1000.0, "mpc_hz [Hz]")
@@ -207,9 +209,9 @@ class NMPCExpert:
             self.counters.count(solution)
             if not solution.usable:
                 return Trajectory(state.time_s, gait, dt, reference, nominal)
-            moved = np.abs(solution.inputs[0] - inputs[0]).max() * FORCE_UNIT
-            states, inputs = np.vstack([x0, solution.states]), solution.inputs
-            if moved < SETTLED:
+            before, states, inputs = states, np.vstack([x0, solution.states]), solution.inputs
+            moved = np.abs(states - before)
+            if max(moved[:, RPY].max(), moved[:, COM].max() / config.com_height) < config.sqp_tolerance:
                 break
         return Trajectory(state.time_s, gait, dt, states, inputs)
 
