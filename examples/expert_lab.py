@@ -40,6 +40,11 @@ class Ledger:
     bad_states: int = 0
     iterations: int = 0
 
+    def add(self, other: "Ledger") -> None:
+        """Enter what another ledger holds as well."""
+        for name, value in vars(other).items():
+            setattr(self, name, getattr(self, name) + value)
+
 
 class CountedExpert:
     """An expert under observation: it answers as it would, and every answer is entered in a ledger.

@@ -12,6 +12,8 @@ from typing import Any
 import joblib
 from expert_lab import Lab
 from expert_limits import LimitsConfig, PushConfig, limits, pushes
+from expert_steady import SteadyConfig, steady
+from expert_timing import MODE_TASKS, ModesConfig, TimingConfig, modes, timing
 from expert_walks import SoakConfig, SurvivalConfig, TransitionConfig, soak, survival, transitions
 from threadpoolctl import threadpool_limits
 from tqdm.auto import tqdm
@@ -46,6 +48,9 @@ SECTIONS = {
     "pushes": Section(pushes, PushConfig()),
     "transitions": Section(transitions, TransitionConfig()),
     "soak": Section(soak, SoakConfig()),
+    "steady": Section(steady, SteadyConfig()),
+    "modes": Section(modes, ModesConfig(), tasks=MODE_TASKS),
+    "timing": Section(timing, TimingConfig(), alone=True),
 }
 """Every section by name, in the order of measuring."""
 QUICK = {
@@ -54,6 +59,9 @@ QUICK = {
     "pushes": {"phases": 2, "grid": 1, "after_s": 1.0},
     "transitions": {"trials": 1, "after_s": 1.0},
     "soak": {"steps": 200},
+    "steady": {"seconds": 4.0},
+    "modes": {"episodes": 1, "seconds": 3.0, "push": PushConfig(1, grid=0, after_s=0.5, directions=("left",))},
+    "timing": {"states": 20, "blocks": 1, "block_s": 0.2},
 }
 """Settings of ``--quick``: everything is measured, nothing is measured well."""
 

@@ -14,6 +14,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from expert_bars import compare
+from expert_figures import save_figures
+from expert_page import card_table, totals_text
 from expert_parts import QUICK, SECTIONS, Part, Section, measure_all
 from publish_results import without_out
 
@@ -22,7 +25,6 @@ from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import number_in
 from trainers.checkpoint import versions
 from trainers.files import write_json
-from trainers.report import closed_loop_table
 
 OUT = Path("docs/results/expert.json")
 PARTS = Path("runs/expert")
@@ -67,10 +69,12 @@ def assemble(
         found[part["section"]][part["task"]] = part["figures"]
         seconds[part["section"]] = round(seconds[part["section"]] + part["seconds"], 1)
     walks = found.pop("survival", {})
-    found = {"changing": {task: walk["changing"] for task, walk in walks.items()}} | found
-    return {
+    scores = {
         "tasks": {task: walk["fixed"] for task, walk in walks.items()},
-        "report": found,
+        "report": {"changing": {task: walk["changing"] for task, walk in walks.items()}} | found,
+    }
+    return scores | {
+        "bars": compare(scores),
         "totals": totals(parts),
         "config": config(chosen, options),
         "seed": options.seed,
@@ -143,9 +147,9 @@ def main(arguments: list[str] | None = None) -> int:
         return 130
     scores["command"] = without_out(shlex.join(["python", "examples/report_expert.py", *arguments]))
     write_json(options.out, scores)
-    if scores["tasks"]:
-        print(f"\n{closed_loop_table(scores['tasks'])}")
-    print(f"\nreport card: {options.out}")
+    pictures = save_figures(scores, options.out.parent)
+    print(f"\n{card_table(scores)}\n\n{totals_text(scores['totals'])}\n\nreport card: {options.out}")
+    print("\n".join(f"picture: {path}" for path in pictures))
     return 0
 
 
