@@ -4,8 +4,8 @@
     python examples/publish_results.py              write both from what docs/results/ holds already
     python examples/publish_results.py --check      change nothing; fail if README.md or the page is out of date
 
-No table of results in README.md is typed by hand: runs come from ``docs/results/metrics.json`` and ``expert.json``,
-gaits and presets from the code.
+No table of results in README.md is typed by hand: runs come from ``metrics.json``, ``expert.json`` and
+``benchmark_expert.json`` in ``docs/results/``, gaits and presets from the code.
 """
 
 import argparse
@@ -23,7 +23,7 @@ from expert_page import PICTURES, expert_block, expert_section
 from go1_mtl_gym import TASKS
 from go1_mtl_gym.errors import InvalidInputError
 from trainers.files import write_atomically, write_json
-from trainers.report import markdown, paper_table, results_table, seconds_table
+from trainers.report import benchmark_table, markdown, paper_table, results_table, seconds_table
 
 ROOT = Path(__file__).resolve().parents[1]
 COPIED = ("joint_targets.png", "gaits.gif")
@@ -133,8 +133,20 @@ def presets_block() -> str:
     return markdown(["", *(f"`{name}`" for name in PRESETS)], rows)
 
 
-def results_page(metrics: Mapping[str, Any], expert: Mapping[str, Any] | None, pictures: Sequence[str] = ()) -> str:
-    """``docs/results/README.md``; `pictures` are those of the expert that are there."""
+def results_page(
+    metrics: Mapping[str, Any],
+    expert: Mapping[str, Any] | None,
+    pictures: Sequence[str] = (),
+    benchmark: Mapping[str, Any] | None = None,
+) -> str:
+    """``docs/results/README.md``.
+
+    Args:
+        metrics: of the main job.
+        expert: its report, if there is one.
+        pictures: names of the expert's pictures that are there.
+        benchmark: of the expert against others, if there is one.
+    """
     parts = [
         "# Results",
         "Written by `examples/publish_results.py` from the files beside it; do not edit.",
@@ -152,6 +164,8 @@ def results_page(metrics: Mapping[str, Any], expert: Mapping[str, Any] | None, p
     ]
     if expert is not None:
         parts += expert_section(expert, _made_by(expert), pictures)
+    if benchmark is not None:
+        parts += ["## Expert against others", benchmark_table(benchmark), f"Made by `{benchmark['command']}`."]
     versions = [[name, str(value)] for name, value in metrics["versions"].items()]
     parts += ["## Versions", markdown(["package", "version"], versions, text_columns=2)]
     return "\n\n".join(parts) + "\n"
@@ -191,10 +205,10 @@ def pages(root: Path) -> dict[Path, str]:
         raise InvalidInputError(f"there is no {readme}")
     texts = {readme: rewrite(readme.read_text(encoding="utf-8"), current_blocks(results))}
     if (results / "metrics.json").is_file():
-        expert = results / "expert.json"
-        known = read_json(expert) if expert.is_file() else None
+        files = [results / f"{name}.json" for name in ("metrics", "expert", "benchmark_expert")]
+        metrics, expert, benchmark = (read_json(path) if path.is_file() else None for path in files)
         pictures = [name for name in PICTURES if (results / f"expert_{name}.png").is_file()]
-        texts[results / "README.md"] = results_page(read_json(results / "metrics.json"), known, pictures)
+        texts[results / "README.md"] = results_page(metrics, expert, pictures, benchmark)
     return texts
 
 
