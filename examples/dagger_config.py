@@ -5,7 +5,7 @@ import dataclasses
 import os
 from typing import Any
 
-from go1_mtl_gym import TASKS, InvalidInputError
+from go1_mtl_gym import PAPER_TASKS, TASKS, InvalidInputError
 from go1_mtl_gym.observation import CHANNELS
 from trainers import BCConfig, DAggerConfig
 
@@ -40,7 +40,7 @@ class JobConfig:
     """
 
     preset: str = "default"
-    tasks: tuple[str, ...] = tuple(TASKS)
+    tasks: tuple[str, ...] = PAPER_TASKS
     rounds: int = 2
     seed: int = 0
     n_envs: int = os.cpu_count() or 1
@@ -154,7 +154,7 @@ def parse(arguments: list[str] | None = None) -> tuple[JobConfig, str | None]:
     add = parser.add_argument
     add("--preset", choices=tuple(PRESETS), default="default", help="smoke: 2 minutes; default: 15; paper: a day")
     add("--out", help="folder of the results; an interrupted run goes on in the same one (default: runs/<date>)")
-    add("--tasks", nargs="+", choices=tuple(TASKS), default=list(TASKS), help="gaits, in head order")
+    add("--tasks", nargs="+", choices=tuple(TASKS), default=list(PAPER_TASKS), help="gaits, in head order")
     add("--rounds", type=int, default=None, help="DAgger rounds; the preset's if not given")
     add("--seed", type=int, default=0, help="of everything random")
     add("--n-envs", type=int, default=os.cpu_count() or 1, help="worker processes")

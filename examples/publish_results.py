@@ -20,7 +20,7 @@ from typing import Any
 from dagger_config import PRESETS, JobConfig
 from expert_page import PICTURES, expert_block, expert_section
 
-from go1_mtl_gym import TASKS
+from go1_mtl_gym import TASKS, env_id
 from go1_mtl_gym.errors import InvalidInputError
 from trainers.files import write_atomically, write_json
 from trainers.report import benchmark_table, markdown, paper_table, results_table, seconds_table
@@ -121,7 +121,7 @@ def gaits_block() -> str:
         offsets = " ".join(f"{value:g}" for value in gait.offsets)
         spans = [f"± {value:g}" for value in task.command_range]
         cells = [f"{gait.period:.2f}", f"{gait.duty:g}", offsets, f"{gait.step_rate:.2f}", *spans]
-        rows.append([name, f"`Go1{name.capitalize()}-v0`", *cells])
+        rows.append([name, f"`{env_id(name).partition(':')[2]}`", *cells])
     header = ["gait", "id", "period [s]", "duty", "offsets FL FR RL RR", "steps/s", "vx [m/s]", "vy [m/s]"]
     return markdown([*header, "yaw rate [rad/s]"], rows, text_columns=2)
 

@@ -4,9 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experts.planar import carried, turned
+from experts.planar import carried, to_complex, turn
 from go1_mtl_gym import robot
+from go1_mtl_gym.gaits import Gait
 from go1_mtl_gym.state import RobotState
+from go1_mtl_gym.validation import number_in
 
 
 @dataclass(frozen=True)
@@ -16,13 +18,20 @@ class FootholdRule:
     Attributes:
         velocity_gain: feedback of the velocity error [s].
         reach: largest horizontal distance between a foothold and the point under its hip [m].
+
+    Raises:
+        InvalidInputError: if a figure is outside its range.
     """
 
     velocity_gain: float = 0.10
-    reach: float = 0.22
+    reach: float = 0.28
+
+    def __post_init__(self) -> None:
+        number_in(self.velocity_gain, 0.0, 1.0, "velocity_gain [s]")
+        number_in(self.reach, 0.02, 0.4, "reach [m]")
 
     def plan(
-        self, state: RobotState, com_w: np.ndarray, com_velocity_w: np.ndarray, touchdown_s: np.ndarray
+        self, state: RobotState, com_w: np.ndarray, velocity_w: np.ndarray, touchdown_s: np.ndarray
     ) -> np.ndarray:
         """Footholds of touchdowns at given times from now.
 
@@ -31,44 +40,47 @@ class FootholdRule:
         Args:
             state: the robot now.
             com_w: its centre of mass, world [m], shape (3,).
-            com_velocity_w: world [m/s], shape (3,).
+            velocity_w: its horizontal velocity without the gait's own sway, world [m/s], shape (2,).
             touchdown_s: time until each touchdown [s], shape (..., 4).
 
         Returns:
             Centres of the feet on the ground, world [m], shape (..., 4, 3).
         """
-        stance_s = state.gait.stance_s
-        vx, vy, yaw_rate = state.command
-        yaw = state.rpy[2]
-        velocity_ref = turned(np.array([vx, vy]), yaw)
-        arm = turned(robot.NOMINAL_FOOT_B[:, :2], yaw + yaw_rate * touchdown_s)
-        hip_velocity = velocity_ref + carried(arm, yaw_rate)
-        step = hip_velocity * (stance_s / 2) + self.velocity_gain * (com_velocity_w[:2] - velocity_ref)
-        step *= np.minimum(1.0, self.reach / np.maximum(np.linalg.norm(step, axis=-1, keepdims=True), 1e-9))
-        feet = np.full((*touchdown_s.shape, 3), robot.FOOT_RADIUS)
-        feet[..., :2] = com_w[:2] + com_velocity_w[:2] * touchdown_s[..., None] + arm + step
+        vx, vy, yaw_rate = state.command.tolist()
+        heading = turn(state.rpy[2])
+        velocity, velocity_ref = to_complex(velocity_w), complex(vx, vy) * heading
+        arm = to_complex(state.gait.nominal_feet_b) * heading * turn(yaw_rate * touchdown_s)
+        step = (velocity_ref + carried(arm, yaw_rate)) * (state.gait.stance_s / 2)
+        step += self.velocity_gain * (velocity - velocity_ref)
+        step *= np.minimum(1.0, self.reach / np.maximum(np.abs(step), 1e-9))
+        point = to_complex(com_w) + velocity * touchdown_s + arm + step
+        feet = np.empty((*touchdown_s.shape, 3))
+        feet[..., 0], feet[..., 1], feet[..., 2] = point.real, point.imag, robot.FOOT_RADIUS
         return feet
 
     def over_horizon(
-        self,
-        state: RobotState,
-        com_w: np.ndarray,
-        com_velocity_w: np.ndarray,
-        feet_w: np.ndarray,
-        dt: float,
-        steps: int,
+        self, state: RobotState, com_w: np.ndarray, velocity_w: np.ndarray, feet_w: np.ndarray, middle: np.ndarray
     ) -> np.ndarray:
         """Where each foot pushes from during each interval of the horizon; meaningless while it is in the air.
 
         Feet on the ground now stay where they are until they lift off; later stances stand on planned footholds.
 
+        Args:
+            state, com_w, velocity_w: as in `plan`.
+            feet_w: centres of the feet now, world [m], shape (4, 3).
+            middle: the clock in the middle of each interval, not wrapped [cycles], shape (N,).
+
         Returns:
-            World [m], shape (steps, 4, 3).
+            World [m], shape (N, 4, 3).
         """
-        gait = state.gait
-        middle = state.phase + (np.arange(steps) + 0.5) * (dt / gait.period)
-        started = np.floor(middle[:, None] + np.array(gait.offsets))
-        touchdown_s = (started - np.array(gait.offsets) - state.phase) * gait.period
-        planned = self.plan(state, com_w, com_velocity_w, touchdown_s)
-        present = (touchdown_s <= 0.0)[..., None]
-        return np.where(present, feet_w, planned)
+        if state.standing:
+            return np.broadcast_to(feet_w, (len(middle), 4, 3))
+        touchdown_s = next_touchdown(state.gait, state.phase, middle)
+        planned = self.plan(state, com_w, velocity_w, touchdown_s)
+        return np.where((touchdown_s <= 0.0)[..., None], feet_w, planned)
+
+
+def next_touchdown(gait: Gait, phase: float, later: np.ndarray) -> np.ndarray:
+    """Time from `phase` until the touchdown that begins the leg cycle running at clocks `later` [s], shape (N, 4)."""
+    offsets = np.array(gait.offsets)
+    return (np.floor(later[:, None] + offsets) - offsets - phase) * gait.period

@@ -1,4 +1,4 @@
-"""The quadratic program of the MPC as data, and its OSQP workspace, set up once and updated.
+"""The quadratic program of the MPC as data, and the MPC that has it solved.
 
 Variables are the states x[1..N] and the inputs u[0..N-1] of `experts.dynamics`:
 
@@ -6,23 +6,22 @@ Variables are the states x[1..N] and the inputs u[0..N-1] of `experts.dynamics`:
     subject to  x[k+1] = A[k] x[k] + B[k] u[k] + c[k]
                 |f_x| <= mu f_z,  |f_y| <= mu f_z,  f_min [s[k] = 1] <= f_z <= f_max s[k]      for each foot,
 
-with s[k] the share of interval k that the foot spends on the ground: feet in the air get exactly no force.
+with s[k] the share of interval k that the foot spends on the ground. Feet in the air get no force; their columns of
+B[k] are zero besides, which changes nothing at the optimum and spares a first-order solver a slow stretch.
 """
 
 from dataclasses import dataclass, field
 
 import numpy as np
-import osqp
 from scipy import sparse
 
-from experts.dynamics import FORCE_UNIT, LinearModel
-from go1_mtl_gym.validation import number_in
+from experts.dynamics import COM, FORCE_UNIT, OMEGA, RPY, VELOCITY, LinearModel
+from experts.solvers import SOLVERS, QPSolver
+from go1_mtl_gym.validation import number_in, one_of
 
 NX = NU = 12
 LARGEST = 1e6
 """A problem with a larger number than this in it is refused; OSQP would take it silently and may stay stuck."""
-INEXACT = 1e-2
-"""Largest residual, in the units of the program, with which an unfinished solution is still used."""
 
 
 @dataclass(frozen=True)
@@ -36,10 +35,11 @@ class MPCConfig:
         friction: mu of the pyramid.
         max_force: f_max of one foot [N].
         min_force: f_min of a foot that stays on the ground throughout an interval [N]; keeps contacts from chattering.
-        tolerance: eps_abs and eps_rel of OSQP.
+        solver: "osqp", or one of the exact solvers "piqp" and "daqp" (extra ``solvers``).
+        tolerance: eps_abs and eps_rel of OSQP, for its scaled problem.
         rho: ADMM step of OSQP; fixed, so that a solution depends on its problem alone.
-        max_iterations: of OSQP; what it has by then is used if its residuals are below `INEXACT`, else the solve
-            failed.
+        relaxation: alpha of OSQP.
+        max_iterations: of OSQP.
 
     Raises:
         InvalidInputError: if a figure is outside its range.
@@ -51,9 +51,11 @@ class MPCConfig:
     friction: float = 0.5
     max_force: float = 160.0
     min_force: float = 10.0
-    tolerance: float = 3e-4
+    solver: str = "osqp"
+    tolerance: float = 6e-4
     rho: float = 2.0
-    max_iterations: int = 500
+    relaxation: float = 1.35
+    max_iterations: int = 300
 
     def __post_init__(self) -> None:
         number_in(self.steps, 4, 64, "steps")
@@ -63,9 +65,11 @@ class MPCConfig:
         number_in(self.min_force, 0.0, 30.0, "min_force [N]")
         number_in(self.tolerance, 1e-9, 1e-1, "tolerance")
         number_in(self.rho, 1e-6, 1e6, "rho")
+        number_in(self.relaxation, 0.5, 1.95, "relaxation")
         number_in(self.max_iterations, 10, 1e6, "max_iterations")
         number_in(len(self.state_weight), NX, NX, "number of state weights")
-        number_in(min(self.state_weight), 0.0, 1e6, "smallest state weight")
+        number_in(min(self.state_weight), 1e-6, 1e6, "smallest state weight")
+        one_of(self.solver, tuple(SOLVERS), "solver")
 
 
 @dataclass(frozen=True)
@@ -73,20 +77,23 @@ class Solution:
     """What the solver returned.
 
     Attributes:
-        forces_w: ground forces of the first interval, world [N], shape (4, 3).
         states: predicted x[1..N], shape (N, 12).
         inputs: u[0..N-1] in units of `FORCE_UNIT`, shape (N, 12).
         iterations: of the solver.
         solved: the solver met its tolerance.
-        usable: it did, or came close (residuals below `INEXACT`), and everything is finite.
+        usable: it did, or came close, and everything is finite.
     """
 
-    forces_w: np.ndarray
     states: np.ndarray
     inputs: np.ndarray
     iterations: int
     solved: bool
     usable: bool
+
+    @property
+    def forces_w(self) -> np.ndarray:
+        """Ground forces of the first interval, world [N], shape (4, 3)."""
+        return self.inputs[0].reshape(4, 3) * FORCE_UNIT
 
 
 @dataclass
@@ -99,9 +106,10 @@ class QuadraticProgram:
         config: sizes, weights and limits.
 
     Attributes:
-        P: constant Hessian, upper triangle (it is diagonal), CSC.
-        A: constraint matrix, CSC; its explicit zeros are part of the pattern.
+        P: constant Hessian (it is diagonal), CSC.
+        A: constraint matrix, CSC; the first 12 N rows are the dynamics. Its explicit zeros are part of the pattern.
         q, l, u: vectors.
+        weight: diagonal of P, shape (24 N,).
     """
 
     config: MPCConfig
@@ -110,29 +118,31 @@ class QuadraticProgram:
     q: np.ndarray = field(init=False)
     l: np.ndarray = field(init=False)  # noqa: E741 (the field's letter)
     u: np.ndarray = field(init=False)
+    weight: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
         n = self.config.steps
-        self._weight = np.concatenate([np.tile(self.config.state_weight, n), np.full(n * NU, self.config.input_weight)])
-        self.P = sparse.diags(self._weight, format="csc")
-        dynamics = _linear_model_pattern()
-        identity = sparse.eye(n * NX)
-        states = identity + sparse.kron(sparse.eye(n, k=-1), dynamics.A[0])
-        inputs = sparse.kron(sparse.eye(n), dynamics.B[0])
-        friction = sparse.hstack([sparse.csc_matrix((20 * n, n * NX)), sparse.kron(sparse.eye(4 * n), self._pyramid())])
-        pattern = sparse.csc_matrix(sparse.vstack([sparse.hstack([states, inputs]), friction]))
+        self.weight = np.concatenate([np.tile(self.config.state_weight, n), np.full(n * NU, self.config.input_weight)])
+        self.P = sparse.diags(self.weight, format="csc")
+        state, force = _linear_model_pattern()
+        rows = np.zeros((n * (NX + 20), n * (NX + NU)))
+        identity, pyramids = np.eye(NX), np.kron(np.eye(4), self._pyramid())
+        for k in range(n):
+            at, on, ineq = slice(NX * k, NX * (k + 1)), slice(NX * (n + k), NX * (n + k + 1)), n * NX + 20 * k
+            rows[at, at], rows[at, on], rows[ineq : ineq + 20, on] = identity, force, pyramids
+            if k:
+                rows[at, NX * (k - 1) : NX * k] = state
+        self.A = sparse.csc_matrix(rows)
         # number the entries, to learn where each entry of A[k] and B[k] stands in the data of the CSC matrix
-        numbered = pattern.copy()
-        numbered.data = np.arange(1.0, pattern.nnz + 1)
-        dense = numbered.toarray().astype(int) - 1
-        self._slot_a = np.stack([dense[NX * k : NX * (k + 1), NX * (k - 1) : NX * k] for k in range(1, n)])
-        first = n * NX
-        self._slot_b = np.stack([dense[NX * k : NX * (k + 1), first + NU * k : first + NU * (k + 1)] for k in range(n)])
-        self._used_a, self._used_b = self._slot_a >= 0, self._slot_b >= 0
-        self._slot_a, self._slot_b = self._slot_a[self._used_a], self._slot_b[self._used_b]
-        self.A = pattern
+        numbered = self.A.copy()
+        numbered.data = np.arange(1.0, numbered.nnz + 1)
+        number = numbered.toarray().astype(int) - 1
+        blocks_a = np.stack([number[NX * k : NX * (k + 1), NX * (k - 1) : NX * k] for k in range(1, n)])
+        blocks_b = np.stack([number[NX * k : NX * (k + 1), NX * (n + k) : NX * (n + k + 1)] for k in range(n)])
+        self._from_a, self._from_b = np.flatnonzero(blocks_a >= 0), np.flatnonzero(blocks_b >= 0)
+        self._to_a, self._to_b = blocks_a.ravel()[self._from_a], blocks_b.ravel()[self._from_b]
         self.q = np.zeros(n * (NX + NU))
-        self.l = np.concatenate([np.zeros(n * NX), np.tile([0.0, 0.0, 0.0, 0.0, 0.0], 4 * n)])
+        self.l = np.zeros(n * (NX + 20))
         self.u = np.concatenate([np.zeros(n * NX), np.tile([np.inf, np.inf, np.inf, np.inf, 0.0], 4 * n)])
 
     def _pyramid(self) -> np.ndarray:
@@ -151,79 +161,53 @@ class QuadraticProgram:
             u_ref: reference of the inputs in units of `FORCE_UNIT`, shape (N, 12).
             contact: shares of ground contact, shape (N, 4).
         """
-        n = self.config.steps
-        self.A.data[self._slot_a] = -model.A[1:][self._used_a]
-        self.A.data[self._slot_b] = -model.B[self._used_b]
-        self.q[:] = -self._weight * np.concatenate([x_ref.ravel(), u_ref.ravel()])
-        offset = model.c.copy()
-        offset[0] += model.A[0] @ x0
-        self.l[: n * NX] = self.u[: n * NX] = offset.ravel()
-        self.l[n * NX + 4 :: 5] = (contact.ravel() > 1 - 1e-9) * (self.config.min_force / FORCE_UNIT)
-        self.u[n * NX + 4 :: 5] = contact.ravel() * (self.config.max_force / FORCE_UNIT)
+        end = self.config.steps * NX
+        on_ground = (contact > 0).repeat(3, axis=1)[:, None]
+        self.A.data[self._to_a] = -model.A[1:].ravel().take(self._from_a)
+        self.A.data[self._to_b] = -(model.B * on_ground).ravel().take(self._from_b)
+        self.q[:end], self.q[end:] = x_ref.ravel(), u_ref.ravel()
+        self.q *= -self.weight
+        offset = model.c.ravel().copy()
+        offset[:NX] += model.A[0] @ x0
+        self.l[:end] = self.u[:end] = offset
+        share = contact.ravel()
+        self.l[end + 4 :: 5] = (share > 1 - 1e-9) * (self.config.min_force / FORCE_UNIT)
+        self.u[end + 4 :: 5] = share * (self.config.max_force / FORCE_UNIT)
 
 
-def _linear_model_pattern() -> LinearModel:
-    """Ones wherever the discretised model can be non-zero."""
-    A = np.zeros((12, 12))
-    A[0:3, 6:9] = A[6:9, 3:6] = 1.0
-    A[3:6, 9:12] = np.eye(3)
-    B = np.zeros((12, 12))
-    B[6:9] = 1.0
-    B[9:12] = np.tile(np.eye(3), 4)
-    step = np.eye(12) + A + A @ A
-    return LinearModel(A=(step != 0)[None].astype(float), B=(B + A @ B != 0)[None].astype(float), c=np.zeros((1, 12)))
+def _linear_model_pattern() -> tuple[np.ndarray, np.ndarray]:
+    """Ones wherever the discretised model's A and B can be non-zero, each of shape (12, 12)."""
+    A, B = np.eye(12), np.zeros((12, 12))
+    for rows, columns in ((RPY, RPY), (RPY, COM), (RPY, OMEGA), (OMEGA, OMEGA), (OMEGA, COM), (OMEGA, VELOCITY)):
+        A[rows, columns] = 1.0
+    A[COM, VELOCITY] = np.eye(3)
+    B[RPY] = B[OMEGA] = 1.0
+    B[COM] = B[VELOCITY] = np.tile(np.eye(3), 4)
+    return A, B
 
 
 class MPC:
-    """Solves `QuadraticProgram`s in one OSQP workspace that is set up once and only updated afterwards.
-
-    Each solve starts from the reference itself with zero multipliers, not from the previous solution: with a fixed rho
-    the answer then depends on the problem alone, and asking twice gives the same bits.
+    """Solves `QuadraticProgram`s; the answer depends on the problem alone, to the bit.
 
     Args:
         config: sizes, weights, limits and solver settings.
+
+    Raises:
+        ImportError: if the configured solver is not installed.
     """
 
     def __init__(self, config: MPCConfig | None = None) -> None:
         self.config = config or MPCConfig()
         self.program = QuadraticProgram(self.config)
-        self._solver = osqp.OSQP()
-        program = self.program
-        self._solver.setup(
-            program.P,
-            program.q,
-            program.A,
-            program.l,
-            program.u,
-            verbose=False,
-            scaling=0,
-            adaptive_rho=0,
-            rho=self.config.rho,
-            eps_abs=self.config.tolerance,
-            eps_rel=self.config.tolerance,
-            max_iter=self.config.max_iterations,
-            check_termination=10,
-            polishing=False,
-            warm_starting=True,
-        )
-        self._multipliers = np.zeros(program.A.shape[0])
+        self._solver: QPSolver = SOLVERS[self.config.solver](self.program)
 
     def solve(
         self, model: LinearModel, x0: np.ndarray, x_ref: np.ndarray, u_ref: np.ndarray, contact: np.ndarray
     ) -> Solution:
         """Solve one problem; arguments as in `QuadraticProgram.update`. Never raises for what the numbers are."""
-        n = self.config.steps
-        program = self.program
+        n, program = self.config.steps, self.program
         program.update(model, x0, x_ref, u_ref, contact)
-        if not all((np.abs(part) < LARGEST).all() for part in (program.q, program.A.data, program.l, contact)):
-            return Solution(np.zeros((4, 3)), x_ref, u_ref, 0, solved=False, usable=False)
-        self._solver.update(q=program.q, l=program.l, u=program.u, Ax=program.A.data)
-        self._solver.warm_start(x=np.concatenate([x_ref.ravel(), u_ref.ravel()]), y=self._multipliers)
-        result = self._solver.solve(raise_error=False)
-        info = result.info
-        finite = bool(np.isfinite(result.x).all())
-        solved = finite and info.status_val == osqp.SolverStatus.OSQP_SOLVED
-        close = finite and max(info.prim_res, info.dual_res) < INEXACT
-        states = result.x[: n * NX].reshape(n, NX)
-        inputs = result.x[n * NX :].reshape(n, NU)
-        return Solution(inputs[0].reshape(4, 3) * FORCE_UNIT, states, inputs, int(info.iter), solved, solved or close)
+        if not all(np.abs(part).max() < LARGEST for part in (program.q, program.A.data, program.l, contact)):
+            return Solution(x_ref, u_ref, 0, solved=False, usable=False)
+        z, iterations, solved, usable = self._solver.solve(program, np.concatenate([x_ref, u_ref]).ravel())
+        return Solution(z[: n * NX].reshape(n, NX), z[n * NX :].reshape(n, NU), iterations, solved, usable)

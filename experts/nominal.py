@@ -6,7 +6,7 @@ itself produces.
 """
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from scipy.optimize import nnls
@@ -16,42 +16,47 @@ from go1_mtl_gym.gaits import Gait
 
 SAMPLES = 96
 """Grid points per cycle."""
+SWAY = 0.3
+"""Largest nominal horizontal force, as a share of the vertical one."""
 _MOMENT_WEIGHT = 20.0  # levelness against evenness of the load when sharing it between the feet
 
 
 @dataclass(frozen=True)
 class NominalMotion:
-    """Periodic functions of the gait clock, sampled at phases i / SAMPLES.
+    """Periodic functions of the gait clock in the heading frame, sampled at phases i / SAMPLES.
 
     Attributes:
-        load: vertical force of each foot in units of the robot's weight, shape (SAMPLES, 4).
-        position: deviations (roll [rad], pitch [rad], z [m]) with zero mean, shape (SAMPLES, 3).
-        velocity: their time derivatives, shape (SAMPLES, 3).
+        force: of each foot in units of the robot's weight, shape (SAMPLES, 4, 3).
+        position: deviations (roll, pitch, yaw [rad], x, y, z [m]) with zero mean, shape (SAMPLES, 6).
+        velocity: their time derivatives, shape (SAMPLES, 6).
     """
 
-    load: np.ndarray
+    force: np.ndarray
     position: np.ndarray
     velocity: np.ndarray
 
-    def at(self, phase: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Deviations and their rates at phases [cycles], each of shape (len(phase), 3), by linear interpolation."""
-        return _periodic(self.position, phase), _periodic(self.velocity, phase)
+    def at(self, phase: np.ndarray) -> np.ndarray:
+        """Deviations and, after them, their rates at phases [cycles], shape (len(phase), 12), interpolated linearly."""
+        where = np.mod(phase, 1.0) * SAMPLES
+        low = where.astype(int)
+        samples, slopes = self._table
+        return samples[low] + (where - low)[:, None] * slopes[low]
 
-    def load_at(self, phase: np.ndarray) -> np.ndarray:
-        """Load of each foot in units of the weight at phases [cycles], shape (len(phase), 4); the sample below."""
-        return self.load[np.floor(np.mod(phase, 1.0) * SAMPLES).astype(int) % SAMPLES]
+    def force_at(self, phase: np.ndarray) -> np.ndarray:
+        """Forces in units of the weight at phases [cycles], shape (len(phase), 4, 3); the sample below."""
+        return self.force[(np.mod(phase, 1.0) * SAMPLES).astype(int) % SAMPLES]
+
+    @cached_property
+    def _table(self) -> tuple[np.ndarray, np.ndarray]:
+        """Samples and their differences to the next, one more than a cycle: rounding can bring a phase to 1."""
+        cycle = np.hstack([self.position, self.velocity])
+        samples = np.vstack([cycle, cycle[:2]])
+        return samples[:-1], np.diff(samples, axis=0)
 
 
-def _periodic(samples: np.ndarray, phase: np.ndarray) -> np.ndarray:
-    where = np.mod(phase, 1.0) * SAMPLES
-    low = np.floor(where).astype(int)
-    share = (where - low)[:, None]
-    return (1 - share) * samples[low % SAMPLES] + share * samples[(low + 1) % SAMPLES]
-
-
-def _share_load(stance: np.ndarray, total: float) -> np.ndarray:
+def _share_load(stance: np.ndarray, feet_b: np.ndarray, total: float) -> np.ndarray:
     """Non-negative loads of the feet on the ground that add up to `total`, nearly level and nearly even."""
-    arm = robot.NOMINAL_FOOT_B[stance, :2] / 0.1
+    arm = feet_b[stance, :2] / 0.1
     count = int(stance.sum())
     rows = np.vstack([1e3 * np.ones(count), _MOMENT_WEIGHT * arm.T, np.eye(count)])
     target = np.concatenate([[1e3 * total, 0.0, 0.0], np.full(count, total / count)])
@@ -67,33 +72,59 @@ def _integrate(rate: np.ndarray, dt: float) -> np.ndarray:
 
 
 @lru_cache(maxsize=64)
-def nominal_motion(gait: Gait, inertia_roll: float, inertia_pitch: float) -> NominalMotion:
+def nominal_motion(gait: Gait, inertia: tuple[float, float, float], height: float) -> NominalMotion:
     """The periodic motion of a body whose feet stand under their hips.
 
-    Newton and Euler for small angles, world frame: m zdd = sum f - m g, Ixx rolldd = sum y f, Iyy pitchdd = - sum x f.
-    Accelerations have zero mean over a cycle; what is left of the mean moment is borne by horizontal forces.
+    Newton and Euler for small angles, F = sum f, feet at (x_i, y_i, -h) from the centre of mass:
+
+        m a = F + m g,   Ixx rolldd = sum y_i f_z,i + h F_y,   Iyy pitchdd = - sum x_i f_z,i - h F_x,
+        Izz yawdd = sum x_i f_y,i - y_i f_x,i.
+
+    The horizontal force is the one that keeps the body level, F_y = - sum y_i f_z,i / h and F_x = - sum x_i f_z,i / h,
+    as far as `SWAY` allows; what is left of the moment turns the body. Accelerations are given zero mean over a cycle.
 
     Args:
         gait: the contact plan.
-        inertia_roll: Ixx of the whole robot [kg m^2].
-        inertia_pitch: Iyy of the whole robot [kg m^2].
+        inertia: Ixx, Iyy, Izz of the whole robot [kg m^2].
+        height: h [m].
     """
     phase = np.arange(SAMPLES) / SAMPLES
     stance = gait.stance(phase)
     supported = stance.any(axis=1)
     load = np.zeros((SAMPLES, 4))
     for i in np.flatnonzero(supported):
-        load[i] = _share_load(stance[i], SAMPLES / supported.sum())
-    weight = robot.MASS * robot.GRAVITY
-    arm = robot.NOMINAL_FOOT_B
-    acceleration = np.stack(
+        load[i] = _share_load(stance[i], gait.nominal_feet_b, SAMPLES / supported.sum())
+    total = load.sum(axis=1, keepdims=True)
+    lever = load @ gait.nominal_feet_b[:, :2]
+    horizontal = np.clip(-lever / height, -SWAY * total, SWAY * total)
+    centre = lever / np.maximum(total, 1e-9)
+    moment = np.column_stack(
         [
-            weight * load @ arm[:, 1] / inertia_roll,
-            -weight * load @ arm[:, 0] / inertia_pitch,
-            robot.GRAVITY * (load.sum(axis=1) - 1.0),
-        ],
-        axis=1,
+            lever[:, 1] + height * horizontal[:, 1],
+            -lever[:, 0] - height * horizontal[:, 0],
+            centre[:, 0] * horizontal[:, 1] - centre[:, 1] * horizontal[:, 0],
+        ]
+    )
+    weight = robot.MASS * robot.GRAVITY
+    acceleration = np.column_stack(
+        [
+            weight * moment / np.array(inertia),
+            robot.GRAVITY * horizontal,
+            robot.GRAVITY * (total - 1.0),
+        ]
     )
     dt = gait.period / SAMPLES
     velocity = _integrate(acceleration - acceleration.mean(axis=0), dt)
-    return NominalMotion(load=load, position=_integrate(velocity, dt), velocity=velocity)
+    share = load / np.maximum(total, 1e-9)
+    force = np.concatenate([share[..., None] * horizontal[:, None], load[..., None]], axis=2)
+    return NominalMotion(force=force, position=_integrate(velocity, dt), velocity=velocity)
+
+
+@lru_cache(maxsize=64)
+def standing_motion(gait: Gait) -> NominalMotion:
+    """No motion, and the weight on all four feet of a gait's stance."""
+    load = _share_load(np.ones(4, bool), gait.nominal_feet_b, 1.0)
+    force = np.zeros((SAMPLES, 4, 3))
+    force[..., 2] = load
+    still = np.zeros((SAMPLES, 6))
+    return NominalMotion(force=force, position=still, velocity=still)

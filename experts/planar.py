@@ -1,15 +1,18 @@
-"""Geometry of the ground plane: turning vectors, and velocities of points on a turning body."""
+"""Geometry of the ground plane in complex numbers: x + iy. Turning by an angle is multiplying by exp(i angle)."""
 
 import numpy as np
 
 
-def turned(vector: np.ndarray, yaw: np.ndarray | float) -> np.ndarray:
-    """Planar vectors (..., 2) turned by angles [rad] of their leading shape; the two are broadcast."""
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    x, y = vector[..., 0], vector[..., 1]
-    return np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
+def to_complex(vector: np.ndarray) -> np.ndarray:
+    """x + iy of planar vectors (..., 2) or of the horizontal part of spatial ones (..., 3)."""
+    return vector[..., 0] + 1j * vector[..., 1]
+
+
+def turn(yaw: np.ndarray | float) -> np.ndarray:
+    """The factor exp(i yaw) that turns a planar vector by an angle [rad]."""
+    return np.exp(1j * np.asarray(yaw))
 
 
 def carried(arm: np.ndarray, yaw_rate: float) -> np.ndarray:
-    """Velocity of planar points at arms (..., 2) [m] of a body that turns at a rate [rad/s]."""
-    return yaw_rate * np.stack([-arm[..., 1], arm[..., 0]], axis=-1)
+    """Velocity of planar points at complex arms [m] of a body that turns at a rate [rad/s]: i yaw_rate arm."""
+    return 1j * yaw_rate * arm

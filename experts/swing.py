@@ -6,7 +6,7 @@ import numpy as np
 
 from experts.footholds import FootholdRule
 from experts.model import Dynamics
-from experts.planar import carried
+from experts.planar import carried, to_complex
 from go1_mtl_gym import robot
 from go1_mtl_gym.state import RobotState
 
@@ -15,7 +15,7 @@ from go1_mtl_gym.state import RobotState
 class SwingRule:
     """PD tracking of a nominal swing.
 
-    Horizontally the foot moves, relative to where it will land, from one step length behind to zero along a quintic;
+    Horizontally the foot moves, relative to where it will land, from one step length behind to zero along a cubic;
     vertically along 16 h s^2 (1 - s)^2. No lift-off position is remembered: a foot that was pushed elsewhere is drawn
     back to the nominal arc.
 
@@ -30,42 +30,59 @@ class SwingRule:
     stiffness: float = 400.0
     damping: float = 40.0
     press: float = 0.003
-    early: float = 0.1
+    early: float = 0.05
 
-    def acceleration(self, state: RobotState, dynamics: Dynamics, footholds: FootholdRule) -> np.ndarray:
-        """Accelerations of all feet as if they were in swing, world [m/s^2], shape (4, 3)."""
+    def acceleration(
+        self, state: RobotState, ahead_s: float, dynamics: Dynamics, velocity_w: np.ndarray, footholds: FootholdRule
+    ) -> np.ndarray:
+        """Accelerations of all feet as if they were in swing, for a moment that is a little ahead.
+
+        The feedback acts on where the foot will be then, h later, if it accelerates so:
+        a = a_arc + k (p_arc - p - v h - a h^2/2) + d (v_arc - v - a h), solved for a.
+
+        Args:
+            state: the robot now.
+            ahead_s: h, half of the time for which the answer is held [s].
+            dynamics: at the state.
+            velocity_w: horizontal velocity of the body, as in `FootholdRule.plan` [m/s], shape (2,).
+            footholds: where the feet are to land.
+
+        Returns:
+            World [m/s^2], shape (4, 3).
+        """
         gait = state.gait
-        progress = gait.swing_progress(state.phase)
-        remaining = (1.0 - progress) * gait.swing_s
+        progress = gait.swing_progress(state.phase + ahead_s / gait.period)
         s = np.minimum(progress / (1.0 - self.early), 1.0)
-        landing = footholds.plan(state, dynamics.com_w, dynamics.com_velocity_w, remaining)
-        arm = landing[:, :2] - dynamics.com_w[:2]
-        stride = (dynamics.com_velocity_w[:2] + carried(arm, state.command[2])) * gait.period
+        remaining = (1.0 - progress) * gait.swing_s + ahead_s
+        landing = footholds.plan(state, dynamics.com_w, velocity_w, remaining)
+        arm = to_complex(landing - dynamics.com_w)
+        stride = (to_complex(velocity_w) + carried(arm, state.command[2])) * gait.period
 
-        left, rate, curvature = _quintic(s)
+        left, rate, curvature = _cubic(s)
         height, climb, bend = _hump(s)
         time = gait.swing_s * (1.0 - self.early)
-        position = landing.copy()
-        position[:, :2] -= left[:, None] * stride
+        position, velocity, forward = landing, np.empty((4, 3)), np.empty((4, 3))
+        for axis, along in ((0, stride.real), (1, stride.imag)):
+            position[:, axis] -= left * along
+            velocity[:, axis] = -rate * along / time
+            forward[:, axis] = -curvature * along / time**2
         position[:, 2] = robot.FOOT_RADIUS + gait.swing_height * height - self.press * s**2
-        velocity = np.zeros((4, 3))
-        velocity[:, :2] = -rate[:, None] * stride / time
         velocity[:, 2] = (gait.swing_height * climb - 2 * self.press * s) / time
-        forward = np.zeros((4, 3))
-        forward[:, :2] = -curvature[:, None] * stride / time**2
         forward[:, 2] = (gait.swing_height * bend - 2 * self.press) / time**2
         down = progress >= 1.0 - self.early
         velocity[down, 2], forward[down] = 0.0, 0.0
-        return (
+        foot, foot_velocity = dynamics.feet_w, dynamics.feet_velocity_w
+        wanted = (
             forward
-            + self.stiffness * (position - dynamics.feet_w)
-            + self.damping * (velocity - dynamics.feet_velocity_w)
+            + self.stiffness * (position - foot - foot_velocity * ahead_s)
+            + self.damping * (velocity - foot_velocity)
         )
+        return wanted / (1.0 + self.damping * ahead_s + self.stiffness * ahead_s**2 / 2)
 
 
-def _quintic(s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """1 - (10 s^3 - 15 s^4 + 6 s^5) and its first and second derivatives."""
-    return 1 - s**3 * (10 - 15 * s + 6 * s**2), -30 * s**2 * (1 - s) ** 2, -60 * s * (1 - s) * (1 - 2 * s)
+def _cubic(s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """1 - (3 s^2 - 2 s^3) and its first and second derivatives."""
+    return 1 - s * s * (3 - 2 * s), -6 * s * (1 - s), -6 * (1 - 2 * s)
 
 
 def _hump(s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

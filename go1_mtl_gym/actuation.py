@@ -7,6 +7,9 @@ import numpy as np
 from go1_mtl_gym import robot
 from go1_mtl_gym.validation import number_in
 
+PHYSICS_HZ = 1000
+"""Rate of the physics, and with it of the actuators [Hz]."""
+
 
 @dataclass(frozen=True)
 class PDGains:

@@ -12,11 +12,14 @@ from gymnasium.spaces import Box
 
 from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import ActionMap, PDGains
+from go1_mtl_gym.arguments import check_control_hz, check_noise, check_phase, check_rendering, check_reset_options
 from go1_mtl_gym.episode import Episode
-from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.estimator import EstimatorError, EstimatorNoise
 from go1_mtl_gym.expert_hook import DEFAULT_EXPERT, check_expert, load_expert
 from go1_mtl_gym.observation import ObservationLayout, SensorNoise
 from go1_mtl_gym.observer import Observer
+from go1_mtl_gym.realism import Realism
+from go1_mtl_gym.registration import register_task
 from go1_mtl_gym.rewards import reward_terms
 from go1_mtl_gym.simulation import PHYSICS_HZ, Simulation
 from go1_mtl_gym.state import RobotState
@@ -29,7 +32,7 @@ RESET_JOINT_NOISE = 0.03
 
 
 class Go1Env(gymnasium.Env):
-    """A Unitree Go1 that walks, trots, bounds or jumps on command.
+    """A Unitree Go1 that moves in the gait of a task, as told by a command.
 
     Observation: a flat float32 Box of 34 raw proprioceptive numbers, the channels asked for, and the one-hot task id;
     the table is in `go1_mtl_gym.observation`.
@@ -43,19 +46,23 @@ class Go1Env(gymnasium.Env):
     than 60 degrees) or when the physics diverges; truncates after `episode_s`.
 
     Info: task, command (asked for), filtered_command (seen by expert and student), base_velocity (measured vx, vy, yaw
-    rate in the heading frame), contacts, phase, reward_terms, fallen, ended ("", "fall", "unstable" or "time").
+    rate in the heading frame), contacts, phase, standing, reward_terms, fallen, ended ("", "fall", "unstable" or
+    "time").
 
     Version history: v0, first.
 
     Args:
         task: name of the task, or None to draw one per episode.
-        tasks: names of the tasks in the one-hot id, in order.
+        tasks: names of the tasks in the one-hot id, in order; None means all that are registered now.
         channels: optional parts of the observation: "command", "gravity", "phase", "last_action".
         history: number of proprioceptive frames in the observation.
         control_hz: rate of `step` [Hz]; a divisor of 1000 from 50 to 1000.
         kp: stiffness of the actuators [N m/rad].
         kd: damping of the actuators [N m s/rad].
         noise: True for the default `SensorNoise`, or one of your own; None for exact sensors.
+        friction, payload_kg, action_delay_s: differences from the expert's model, see `go1_mtl_gym.realism.Realism`.
+        estimator_noise: True for the default `EstimatorNoise`, or one of your own: the expert then sees
+            `estimated_state`; None shows it the true state.
         episode_s: length of an episode [s].
         expert: ``"module:Class"`` or a callable; called with ``gains=PDGains, hold_s=control period`` on first use,
             must give an object with ``reset(state)`` and ``action(state)``, which returns 12 joint targets [rad] for a
@@ -73,13 +80,17 @@ class Go1Env(gymnasium.Env):
         self,
         task: str | None = "trot",
         *,
-        tasks: Sequence[str] = tuple(TASKS),
+        tasks: Sequence[str] | None = None,
         channels: Sequence[str] = (),
         history: int = 1,
         control_hz: int = 50,
         kp: float = 50.0,
         kd: float = 2.0,
         noise: SensorNoise | bool | None = None,
+        friction: float | None = None,
+        payload_kg: float = 0.0,
+        action_delay_s: float = 0.0,
+        estimator_noise: EstimatorNoise | bool | None = None,
         episode_s: float = 30.0,
         expert: str | Callable[..., Any] = DEFAULT_EXPERT,
         render_mode: str | None = None,
@@ -87,19 +98,11 @@ class Go1Env(gymnasium.Env):
         height: int = 480,
     ) -> None:
         self._arguments = {name: value for name, value in locals().items() if name not in ("self", "__class__")}
-        self.tasks = check_task_names(tasks)
+        self.tasks = self._arguments["tasks"] = check_task_names(tuple(TASKS) if tasks is None else tasks)
         if task is not None:
             one_of(task, self.tasks, "task")
-        rate = number_in(control_hz, 50, PHYSICS_HZ, "control_hz")
-        if rate % 1 or PHYSICS_HZ % rate:
-            raise InvalidInputError(f"control_hz must be an integer that divides {PHYSICS_HZ}, got {control_hz}")
-        for name, size in (("width", width), ("height", height)):
-            number_in(size, 16, 8192, f"{name} [pixels]")
-        if render_mode is not None:
-            one_of(render_mode, self.metadata["render_modes"], "render_mode")
-        if not (noise is None or isinstance(noise, (bool, SensorNoise))):
-            raise InvalidInputError(f"noise must be None, True, False or a SensorNoise, got {noise!r}")
-        self.control_hz = int(rate)
+        self.control_hz = check_control_hz(control_hz)
+        check_rendering(render_mode, self.metadata["render_modes"], width, height)
         self.control_s = 1.0 / self.control_hz
         self.gains = PDGains(kp, kd)
         self.action_map = ActionMap.for_gains(self.gains)
@@ -107,9 +110,10 @@ class Go1Env(gymnasium.Env):
         self.observation_space = Box(self.layout.low, self.layout.high, dtype=np.float32)
         self.action_space = Box(-1.0, 1.0, (12,), dtype=np.float32)
         self.render_mode = render_mode
-        self._observer = Observer(self.layout, SensorNoise() if noise is True else (noise or None), self.tasks)
-        self._episode_steps = round(number_in(episode_s, 1.0 / rate, 1e6, "episode_s") * control_hz)
-        self._simulation = Simulation(self.gains)
+        self._observer = Observer(self.layout, check_noise(noise, SensorNoise, "noise"), self.tasks)
+        self._episode_steps = round(number_in(episode_s, self.control_s, 1e6, "episode_s") * self.control_hz)
+        self._simulation = Simulation(self.gains, Realism(friction, payload_kg, action_delay_s))
+        self._estimator_noise = check_noise(estimator_noise, EstimatorNoise, "estimator_noise")
         self._make_expert = check_expert(expert)
         self._expert: Any = None
         self._renderer: Any = None
@@ -128,31 +132,27 @@ class Go1Env(gymnasium.Env):
         Raises:
             InvalidInputError: for an unknown option, task or impossible command; the running episode is left as it is.
         """
-        options = dict(options or {})
-        for name in options:
-            one_of(name, ("command", "task"), "reset option")
-        if options.get("task") is not None:
-            one_of(options["task"], self.tasks, "task")
-        if options.get("command") is not None:
-            TASKS[options.get("task") or self._arguments["task"] or self.tasks[0]].check_command(options["command"])
+        name, command = check_reset_options(options, self.tasks, self._arguments["task"])
         super().reset(seed=seed)
-        task = TASKS[options.get("task") or self._arguments["task"] or str(self.np_random.choice(self.tasks))]
+        task = TASKS[name or str(self.np_random.choice(self.tasks))]
         drawn = task.draw_command(self.np_random)
         self._episode = Episode(
             task=task,
-            command=drawn if options.get("command") is None else task.check_command(options["command"]),
+            command=drawn if command is None else command,
             last_action=self.action_map.from_radians(robot.HOME_POSE),
             older_frames=deque(maxlen=self.layout.history - 1),
         )
         joint_noise = self.np_random.uniform(-RESET_JOINT_NOISE, RESET_JOINT_NOISE, 12)
         self._simulation.reset(robot.HOME_POSE + joint_noise)
-        state = self.state
+        if self._estimator_noise is not None:
+            self._episode.estimator_error = EstimatorError(self._estimator_noise, int(self.np_random.integers(2**63)))
         if self._expert is not None:
-            self._expert.reset(state)
+            self._expert.reset(self.estimated_state)
+        state = self.state
         observation = self._observer.observe(self._simulation, state, self._episode, self.np_random)
         if self.render_mode == "human":
             self.render()
-        return observation, self._info({}, "", state)
+        return observation, self._episode.info(state, {}, "")
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict]:
         """Hold one action for a control period.
@@ -184,7 +184,7 @@ class Go1Env(gymnasium.Env):
         if self.render_mode == "human":
             self.render()
         terminated = ended in ("fall", "unstable")
-        return observation, sum(terms.values()), terminated, ended == "time", self._info(terms, ended, state)
+        return observation, sum(terms.values()), terminated, ended == "time", episode.info(state, terms, ended)
 
     def render(self) -> np.ndarray | None:
         """Draw the robot, its feet's contacts and its command; an RGB array (height, width, 3) in "rgb_array" mode."""
@@ -219,26 +219,36 @@ class Go1Env(gymnasium.Env):
 
     @property
     def state(self) -> RobotState:
-        """All that an expert may read, now."""
+        """The robot, its clock and its command, now, as they truly are."""
         return self._observer.state(self._simulation, self._running("state"))
 
+    @property
+    def estimated_state(self) -> RobotState:
+        """All that an expert may read, now: `state` with the errors of the `estimator_noise`."""
+        return self._running("estimated_state").estimated(self.state)
+
     def expert_action(self) -> np.ndarray:
-        """The expert's action for the present state, float32, shape (12,). Changes nothing, here or later."""
-        state = self.state
+        """The expert's action for the `estimated_state`, float32, shape (12,). Changes nothing, here or later."""
+        state = self.estimated_state
         if self._expert is None:
             self._expert = load_expert(self._make_expert)(gains=self.gains, hold_s=self.control_s)
             self._expert.reset(state)
         return self.action_map.from_radians(self._expert.action(state)).astype(np.float32)
 
-    def set_task(self, task: str) -> None:
-        """Change the task while running; the gait clock's phase and the command go on.
+    def set_task(self, task: str, phase: float | None = None) -> None:
+        """Change the task while running; the command goes on.
+
+        Args:
+            task: name of the new one.
+            phase: of its gait [cycles], in [0, 1); None keeps the clock's.
 
         Raises:
-            InvalidInputError: if the task is unknown here, or does not allow the present command.
+            InvalidInputError: if the task is unknown here, does not allow the present command, or the phase is none.
         """
         episode = self._running("set_task")
         new = TASKS[one_of(task, self.tasks, "task")]
         new.check_command(episode.command)
+        episode.phase = episode.phase if phase is None else check_phase(phase)
         episode.task = new
 
     def set_command(self, command: Sequence[float]) -> None:
@@ -264,6 +274,7 @@ class Go1Env(gymnasium.Env):
     def __getstate__(self) -> dict[str, Any]:
         """Arguments and running state; a copy continues to the bit, without the original's window or expert."""
         return {
+            "registered": tuple(TASKS[name] for name in self.tasks),
             "arguments": self._arguments,
             "episode": copy.deepcopy(self._episode),
             "snapshot": self._simulation.snapshot(),
@@ -272,6 +283,8 @@ class Go1Env(gymnasium.Env):
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
+        for task in state["registered"]:  # another process may not know them yet
+            register_task(task)
         self.__init__(**state["arguments"])
         self._simulation.restore(state["snapshot"])
         self._np_random = state["np_random"]
@@ -284,17 +297,3 @@ class Go1Env(gymnasium.Env):
         if self._episode is None:
             raise ResetNeeded(f"call reset() before {what}")
         return self._episode
-
-    def _info(self, terms: dict[str, float], ended: str, state: RobotState) -> dict[str, Any]:
-        episode = self._running("info")
-        return {
-            "task": episode.task.name,
-            "command": episode.command.copy(),
-            "filtered_command": episode.filtered_command.copy(),
-            "base_velocity": np.nan_to_num(state.base_velocity),
-            "contacts": state.contacts,
-            "phase": episode.phase,
-            "reward_terms": terms,
-            "fallen": ended in ("fall", "unstable"),
-            "ended": ended,
-        }

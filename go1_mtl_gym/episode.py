@@ -2,13 +2,34 @@
 
 from collections import deque
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
+from go1_mtl_gym.clock import next_phase
+from go1_mtl_gym.estimator import EstimatorError
+from go1_mtl_gym.state import RobotState
 from go1_mtl_gym.tasks import Task
 
 COMMAND_FILTER_S = 0.2
 """Time constant of the low-pass between a command and what expert and student see of it [s]."""
+COMMAND_SLEW = (4.0, 4.0, 8.0)
+"""Largest change of the filtered command per second: vx, vy [m/s^2], yaw rate [rad/s^2]."""
+
+
+def filtered(command: np.ndarray, before: np.ndarray, seconds: float) -> np.ndarray:
+    """The filtered command after some time: first-order low-pass, then a limit on its slope.
+
+    c' = c + clip((1 - exp(-t / 0.2 s)) (command - c), -COMMAND_SLEW t, COMMAND_SLEW t), each component by itself.
+
+    Args:
+        command: as asked for (vx [m/s], vy [m/s], yaw rate [rad/s]), shape (3,).
+        before: c, the filtered command so far, shape (3,).
+        seconds: t [s].
+    """
+    limit = np.array(COMMAND_SLEW) * seconds
+    share = 1.0 - np.exp(-seconds / COMMAND_FILTER_S)
+    return before + np.clip(share * (command - before), -limit, limit)
 
 
 @dataclass
@@ -23,6 +44,8 @@ class Episode:
         filtered_command: what expert and student see of the command, shape (3,).
         phase: the gait clock [cycles], in [0, 1).
         steps: control periods since the reset.
+        time_s: since the reset [s].
+        estimator_error: what the expert's state estimator gets wrong, or None for the true state.
     """
 
     task: Task
@@ -32,10 +55,42 @@ class Episode:
     filtered_command: np.ndarray = field(default_factory=lambda: np.zeros(3))
     phase: float = 0.0
     steps: int = 0
+    time_s: float = 0.0
+    estimator_error: EstimatorError | None = None
 
     def advance(self, control_s: float) -> None:
-        """Let one control period [s] pass: clock and command filter move on."""
-        self.phase = (self.phase + control_s / self.task.gait.period) % 1.0
-        share = 1.0 - np.exp(-control_s / COMMAND_FILTER_S)
-        self.filtered_command = self.filtered_command + share * (self.command - self.filtered_command)
+        """Let one control period [s] pass: clock and command filter move on.
+
+        The clock obeys the filtered command that expert and student saw at the beginning of the period.
+        """
+        self.phase = next_phase(self.task.gait, self.phase, self.filtered_command, control_s)
+        self.filtered_command = filtered(self.command, self.filtered_command, control_s)
         self.steps += 1
+        self.time_s = self.steps * control_s
+        if self.estimator_error is not None:
+            self.estimator_error.advance()
+
+    def estimated(self, state: RobotState) -> RobotState:
+        """What the state estimator makes of the true state, now."""
+        return state if self.estimator_error is None else self.estimator_error.estimate(state)
+
+    def info(self, state: RobotState, terms: dict[str, float], ended: str) -> dict[str, Any]:
+        """What `reset` and `step` report.
+
+        Args:
+            state: the true one, now.
+            terms: of the reward.
+            ended: why the episode is over; "" while it goes on.
+        """
+        return {
+            "task": self.task.name,
+            "command": self.command.copy(),
+            "filtered_command": self.filtered_command.copy(),
+            "base_velocity": np.nan_to_num(state.base_velocity),
+            "contacts": state.contacts,
+            "phase": self.phase,
+            "standing": state.standing,
+            "reward_terms": terms,
+            "fallen": ended in ("fall", "unstable"),
+            "ended": ended,
+        }

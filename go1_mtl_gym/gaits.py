@@ -1,10 +1,12 @@
-"""Gaits as data: when each foot is on the ground, and how high it swings."""
+"""Gaits as data: when each foot is on the ground, where it stands, and how high it swings."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from types import MappingProxyType
 
 import numpy as np
 
+from go1_mtl_gym import robot
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import finite_vector, number_in
 
@@ -22,6 +24,7 @@ class Gait:
         duty: share of the cycle that a foot spends on the ground.
         offsets: phase offset of each leg in cycles, order FL, FR, RL, RR.
         swing_height: clearance of a foot in the middle of its swing [m].
+        stance_width: sideways distance of the footholds from the middle line, as a factor on the standing robot's.
 
     Raises:
         InvalidInputError: if a figure is outside its range.
@@ -32,6 +35,7 @@ class Gait:
     duty: float
     offsets: tuple[float, float, float, float]
     swing_height: float = 0.06
+    stance_width: float = 1.0
 
     def __post_init__(self) -> None:
         if not self.name:
@@ -39,7 +43,9 @@ class Gait:
         number_in(self.period, 0.15, 3.0, f"period [s] of gait {self.name!r}")
         number_in(self.duty, 0.2, 0.95, f"duty of gait {self.name!r}")
         number_in(self.swing_height, 0.01, 0.2, f"swing_height [m] of gait {self.name!r}")
-        finite_vector(self.offsets, 4, f"offsets of gait {self.name!r}")
+        number_in(self.stance_width, 0.3, 1.5, f"stance_width of gait {self.name!r}")
+        offsets = finite_vector(self.offsets, 4, f"offsets of gait {self.name!r}")
+        object.__setattr__(self, "offsets", tuple(offsets.tolist()))  # a gait can be hashed and compared
 
     @property
     def stance_s(self) -> float:
@@ -55,6 +61,19 @@ class Gait:
     def step_rate(self) -> float:
         """Touchdowns per leg per second [1/s]."""
         return 1.0 / self.period
+
+    @property
+    def can_stand(self) -> bool:
+        """Whether all feet are on the ground at phase 0, where the clock may stop."""
+        return bool(self.stance(0.0).all())
+
+    @property
+    def nominal_feet_b(self) -> np.ndarray:
+        """Points of the trunk frame under which the feet stand in this gait [m], shape (4, 3), read-only.
+
+        `robot.NOMINAL_FOOT_B` with y times `stance_width`.
+        """
+        return _nominal_feet_b(self.stance_width)
 
     def leg_phase(self, phase: float | np.ndarray) -> np.ndarray:
         """Position of each leg in its own cycle, in [0, 1); shape of `phase` + (4,)."""
@@ -85,6 +104,13 @@ class Gait:
         return np.clip(np.diff(ground, axis=0) / (dt / self.period), 0.0, 1.0)
 
 
+@lru_cache(maxsize=64)
+def _nominal_feet_b(stance_width: float) -> np.ndarray:
+    feet = robot.NOMINAL_FOOT_B * np.array([1.0, stance_width, 1.0])
+    feet.flags.writeable = False
+    return feet
+
+
 GAITS = MappingProxyType(
     {
         gait.name: gait
@@ -93,6 +119,8 @@ GAITS = MappingProxyType(
             Gait("bound", period=0.32, duty=0.45, offsets=(0.0, 0.0, 0.5, 0.5), swing_height=0.06),
             Gait("jump", period=0.45, duty=0.55, offsets=(0.0, 0.0, 0.0, 0.0), swing_height=0.04),
             Gait("walk", period=0.60, duty=0.78, offsets=(0.25, 0.75, 0.0, 0.5), swing_height=0.06),
+            Gait("pace", period=0.32, duty=0.55, offsets=(0.0, 0.5, 0.0, 0.5), swing_height=0.05, stance_width=0.7),
+            Gait("gallop", period=0.32, duty=0.50, offsets=(0.0, 0.1, 0.5, 0.6), swing_height=0.06),
         )
     }
 )

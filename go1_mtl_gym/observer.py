@@ -37,6 +37,7 @@ class Observer:
             gait=episode.task.gait,
             phase=episode.phase,
             command=episode.filtered_command,
+            time_s=episode.time_s,
         )
 
     def observe(

@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 
 from go1_mtl_gym import robot
-from go1_mtl_gym.actuation import PDGains
+from go1_mtl_gym.actuation import PHYSICS_HZ, PDGains
+from go1_mtl_gym.realism import ActionDelay, Realism
 
-PHYSICS_HZ = 1000
 CONTACT_FORCE = 2.0
 """A foot counts as on the ground when it presses with more than this [N]."""
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
@@ -29,6 +29,7 @@ class Simulation:
 
     Args:
         gains: of the PD actuators.
+        realism: what is different about the physics.
 
     Attributes:
         model: the MuJoCo model; private to this simulation, so it may be changed (friction, masses). Copies of an
@@ -36,9 +37,12 @@ class Simulation:
         data: the MuJoCo data.
     """
 
-    def __init__(self, gains: PDGains) -> None:
+    def __init__(self, gains: PDGains, realism: Realism | None = None) -> None:
+        realism = realism or Realism()
         self.model = mujoco.MjModel.from_xml_path(robot.SCENE_PATH)
+        realism.apply(self.model)
         self.data = mujoco.MjData(self.model)
+        self._delay = ActionDelay(realism.delay_steps)
         self.model.opt.timestep = 1.0 / PHYSICS_HZ
         self.model.actuator_gainprm[:, 0] = gains.kp
         self.model.actuator_biasprm[:, 1] = -gains.kp
@@ -64,18 +68,20 @@ class Simulation:
         self.data.qpos[:7] = [0.0, 0.0, robot.STANDING_HEIGHT, np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)]
         self.data.qpos[7:] = q
         self.data.ctrl[:] = q
+        self._delay.reset(q)
         mujoco.mj_kinematics(self.model, self.data)
         self.data.qpos[2] -= self.feet_w[:, 2].min() - robot.FOOT_RADIUS
         mujoco.mj_forward(self.model, self.data)
 
     def step(self, target: np.ndarray, physics_steps: int) -> None:
-        """Hold joint targets [rad], shape (12,), for a number of 1 ms steps.
+        """Command joint targets [rad], shape (12,), for a number of 1 ms steps; the delay decides when they are held.
 
         Sensors, contacts and torques read afterwards belong to the state after the step: `mj_step` leaves those of
         the state before it, so the forward pass is run once more.
         """
-        self.data.ctrl[:] = target
-        mujoco.mj_step(self.model, self.data, nstep=physics_steps)
+        for held, steps in self._delay.send(target, physics_steps):
+            self.data.ctrl[:] = held
+            mujoco.mj_step(self.model, self.data, nstep=steps)
         mujoco.mj_forward(self.model, self.data)
 
     def push(self, delta_velocity_w: np.ndarray) -> None:
@@ -124,13 +130,15 @@ class Simulation:
         )
 
     def snapshot(self) -> np.ndarray:
-        """Everything needed to continue to the bit, as one vector."""
+        """Everything needed to continue to the bit, as one vector: MuJoCo's state, then the targets on their way."""
         state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
         mujoco.mj_getState(self.model, self.data, state, _STATE)
-        return state
+        return np.concatenate([state, self._delay.waiting.ravel()])
 
     def restore(self, snapshot: np.ndarray) -> None:
-        """Return to a snapshot of a simulation of the same model."""
-        mujoco.mj_setState(self.model, self.data, snapshot, _STATE)
+        """Return to a snapshot of a simulation of the same model and delay."""
+        state, waiting = np.split(snapshot, [mujoco.mj_stateSize(self.model, _STATE)])
+        mujoco.mj_setState(self.model, self.data, state, _STATE)
         mujoco.mj_forward(self.model, self.data)
-        mujoco.mj_setState(self.model, self.data, snapshot, _STATE)
+        mujoco.mj_setState(self.model, self.data, state, _STATE)
+        self._delay.waiting = waiting.reshape(-1, 12).copy()

@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
+from go1_mtl_gym.clock import is_standing
 from go1_mtl_gym.gaits import Gait
 
 
@@ -25,6 +26,7 @@ class RobotState:
         gait: the contact plan asked for.
         phase: the gait clock [cycles], in [0, 1).
         command: filtered (vx [m/s], vy [m/s], yaw rate [rad/s]) in the heading frame, shape (3,).
+        time_s: since the reset [s].
     """
 
     position_w: np.ndarray
@@ -37,6 +39,12 @@ class RobotState:
     gait: Gait
     phase: float
     command: np.ndarray
+    time_s: float = 0.0
+
+    @cached_property
+    def standing(self) -> bool:
+        """Whether the gait clock rests, so that all feet stay on the ground; a function of gait, phase and command."""
+        return is_standing(self.gait, self.phase, self.command)
 
     @cached_property
     def rotation(self) -> np.ndarray:

@@ -1,5 +1,6 @@
 """Tasks: a gait, the commands it is asked to follow, and what its reward weighs."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -24,7 +25,7 @@ class Task:
         reward: weights of the reward terms.
 
     Raises:
-        InvalidInputError: if the range exceeds the limit or a figure is negative.
+        InvalidInputError: if the gait is none, the range exceeds the limit, or a figure is negative.
     """
 
     name: str
@@ -34,6 +35,8 @@ class Task:
     reward: RewardWeights = field(default_factory=RewardWeights)
 
     def __post_init__(self) -> None:
+        if not isinstance(self.gait, Gait):
+            raise InvalidInputError(f"gait of task {self.name!r} must be a Gait, got {self.gait!r}")
         span = finite_vector(self.command_range, 3, f"command_range of task {self.name!r}")
         limit = finite_vector(self.command_limit, 3, f"command_limit of task {self.name!r}")
         if (span < 0).any() or (span > limit).any():
@@ -41,6 +44,8 @@ class Task:
                 f"command_range of task {self.name!r} must lie between 0 and command_limit {limit.tolist()}, "
                 f"got {span.tolist()}"
             )
+        object.__setattr__(self, "command_range", tuple(span.tolist()))  # tasks can be compared
+        object.__setattr__(self, "command_limit", tuple(limit.tolist()))
 
     def draw_command(self, rng: np.random.Generator) -> np.ndarray:
         """A uniform draw of (vx, vy, yaw rate) from the task's range, shape (3,)."""
@@ -62,18 +67,45 @@ class Task:
         return vector
 
 
-TASKS = MappingProxyType(
-    {
-        task.name: task
-        for task in (
-            Task("trot", GAITS["trot"], command_range=(0.8, 0.3, 0.5)),
-            Task("bound", GAITS["bound"], command_range=(0.5, 0.3, 0.5)),
-            Task("jump", GAITS["jump"], command_range=(0.5, 0.3, 0.5)),
-            Task("walk", GAITS["walk"], command_range=(0.5, 0.3, 0.5)),
+_REGISTRY = {
+    task.name: task
+    for task in (
+        Task("trot", GAITS["trot"], command_range=(0.8, 0.3, 0.5)),
+        Task("bound", GAITS["bound"], command_range=(0.5, 0.3, 0.5)),
+        Task("jump", GAITS["jump"], command_range=(0.5, 0.3, 0.5)),
+        Task("walk", GAITS["walk"], command_range=(0.5, 0.3, 0.5)),
+        Task("pace", GAITS["pace"], command_range=(0.5, 0.2, 0.5)),
+        Task("gallop", GAITS["gallop"], command_range=(0.5, 0.2, 0.5)),
+    )
+}
+TASKS = MappingProxyType(_REGISTRY)
+"""The registered tasks by name, live and read-only; `go1_mtl_gym.register_task` adds to them.
+
+Their order is the order of a policy's heads and of the one-hot task id.
+"""
+PAPER_TASKS = ("trot", "bound", "jump", "walk")
+"""The gaits of arXiv 2505.08574, in head order: what the main job teaches unless told otherwise."""
+_NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z][a-z0-9]*)*")
+
+
+def add_task(task: Task) -> bool:
+    """Put a task at the end of `TASKS`; whether it was new. `go1_mtl_gym.register_task` also registers its id.
+
+    Raises:
+        InvalidInputError: if it is no `Task`, its name is no word like "amble" or "fast_trot", or another task has it.
+    """
+    if not isinstance(task, Task):
+        raise InvalidInputError(f"a Task was expected, got {task!r}")
+    if not isinstance(task.name, str) or not _NAME.fullmatch(task.name) or task.name == "multi_gait":
+        raise InvalidInputError(
+            "a registered task's name must be lower-case words joined by underscores, such as 'amble' or 'fast_trot', "
+            f"and not 'multi_gait', got {task.name!r}"
         )
-    }
-)
-"""The registered tasks by name; their order is the order of a policy's heads and of the one-hot task id."""
+    known = _REGISTRY.get(task.name)
+    if known is not None and known != task:
+        raise InvalidInputError(f"the name {task.name!r} is taken by another task, {known}; got {task}")
+    _REGISTRY.setdefault(task.name, task)
+    return known is None
 
 
 def check_task_names(names: object) -> tuple[str, ...]:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from experts import MPCConfig
+from go1_mtl_gym import clock, episode, robot, termination
 from go1_mtl_gym import env as environment
-from go1_mtl_gym import episode, robot, termination
 from trainers import MultiHeadPolicy, evaluation, make_env
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -27,7 +27,7 @@ def first_line(code: str) -> str:
 
 
 @pytest.mark.parametrize("code", blocks("python"), ids=first_line)
-def test_snippets_run(code, tmp_path, monkeypatch, capsys):
+def test_snippets_run(code, tmp_path, monkeypatch, capsys, passing_tasks):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", ["snippet.py"])
     exec(compile(code, "README.md", "exec"), {"__name__": "__main__"})
@@ -99,6 +99,10 @@ def test_figures_in_the_text_are_the_codes():
     tilt = np.degrees(np.arccos(termination.FALLEN_COSINE))
     assert f"tilted by more than {tilt:.0f} degrees" in PROSE
     assert f"time constant {episode.COMMAND_FILTER_S} s" in PROSE
+    slew, turn = episode.COMMAND_SLEW[0], episode.COMMAND_SLEW[2]
+    assert f"at most {slew:g} m/s and {turn:g} rad/s per second" in PROSE
+    still, turn = clock.STAND_COMMAND[0], clock.STAND_COMMAND[2]
+    assert f"below {still} m/s and {turn} rad/s" in PROSE
     hip, thigh, calf = robot.TORQUE_LIMIT[:3]
     assert f"torque limits of {hip}, {thigh} and {calf} N m" in PROSE
 

@@ -14,7 +14,7 @@ from tqdm.auto import tqdm
 
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
 from trainers.dataset import Demonstrations
-from trainers.environments import EnvFactory, PerturbationConfig, derive_seed, make_env
+from trainers.environments import EnvFactory, PerturbationConfig, WithTasks, derive_seed, make_env
 
 BEFORE_FALL_S = 0.24
 """The last seconds before a fall are not worth imitating and are dropped [s]."""
@@ -177,7 +177,7 @@ def collect_all(
                 _make_shard(job, path, make_env)
                 bar.update()
         elif todo:
-            tasks = (joblib.delayed(_make_shard)(job, path, make_env) for job, path in todo)
+            tasks = (joblib.delayed(WithTasks(_make_shard))(job, path, make_env) for job, path in todo)
             for _ in joblib.Parallel(n_jobs=n_jobs, return_as="generator_unordered")(tasks):
                 bar.update()
     return paths

@@ -1,6 +1,7 @@
 """Making the environments that the trainers step: one place for ids, keyword arguments, disturbances and seeds."""
 
 import dataclasses
+import functools
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -88,21 +89,28 @@ def make_venv(
     if per_task < 1:
         raise InvalidInputError(f"per_task must be at least 1, got {per_task}")
     kwargs = dict(env_kwargs or {})
-    thunks = [_Thunk(make_env, task, perturbation, kwargs) for task in tasks for _ in range(per_task)]
+    calls = [functools.partial(make_env, task, perturbation, **kwargs) for task in tasks]
+    thunks = [WithTasks(call) for call in calls for _ in range(per_task)]
     return SubprocVecEnv(thunks, start_method="spawn") if subproc else DummyVecEnv(thunks)
 
 
 @dataclasses.dataclass(frozen=True)
-class _Thunk:
-    """A picklable call of an environment factory."""
+class WithTasks:
+    """A function that takes the tasks registered here along to whichever process calls it.
 
-    make: EnvFactory
-    task: str
-    perturbation: PerturbationConfig | None
-    env_kwargs: dict[str, Any]
+    Attributes:
+        function: what is called; picklable, as all of this is.
+        tasks: registered before each call; what is known already is left as it is.
+    """
 
-    def __call__(self) -> gymnasium.Env:
-        return self.make(self.task, self.perturbation, **self.env_kwargs)
+    function: Callable[..., Any]
+    tasks: tuple[go1_mtl_gym.Task, ...] = dataclasses.field(default_factory=lambda: tuple(go1_mtl_gym.TASKS.values()))
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        """Register the tasks, then call the function."""
+        for task in self.tasks:
+            go1_mtl_gym.register_task(task)
+        return self.function(*args, **kwargs)
 
 
 def derive_seed(*keys: int | str) -> int:

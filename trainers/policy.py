@@ -35,7 +35,7 @@ class MultiHeadPolicy(ActorCriticPolicy):
         action_space: flat Box of the actions.
         lr_schedule: progress -> learning rate of `optimizer`; stable-baselines3 passes its own.
         width: units of every hidden layer of the actor (the paper: 2560).
-        n_tasks: number of tasks K; None means all of `go1_mtl_gym.TASKS`.
+        n_tasks: number of tasks K; None means those of `env_kwargs`, or all that are registered.
         pooled: the baseline that ignores the task id: one head for all tasks, same depth as one path of the multi-head.
         normalization: "mean_std", "min_max" or "none"; used by `fit_normalization`.
         clip_sd: normalised inputs are clipped to +- this.
@@ -67,14 +67,17 @@ class MultiHeadPolicy(ActorCriticPolicy):
         optimizer_kwargs: dict[str, Any] | None = None,
         use_sde: bool = False,
     ) -> None:
-        n_tasks = len(TASKS) if n_tasks is None else n_tasks
+        env_kwargs = dict(env_kwargs or {})
+        if n_tasks is None:  # tasks that are registered later are none of this policy's
+            env_kwargs["tasks"] = tuple(env_kwargs.get("tasks") or TASKS)
+            n_tasks = len(env_kwargs["tasks"])
         _check_arguments(observation_space, action_space, width, n_tasks, normalization, clip_sd, use_sde)
         self.width = int(width)
         self.n_tasks = int(n_tasks)
         self.pooled = bool(pooled)
         self.normalization = normalization
         self.clip_sd = float(clip_sd)
-        self.env_kwargs = dict(env_kwargs or {})
+        self.env_kwargs = env_kwargs
         self.seed = seed
         super().__init__(
             observation_space,

@@ -11,6 +11,8 @@ from go1_mtl_gym.env import Go1Env
 COPIERS = pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))],
                                   ids=["deepcopy", "pickle"])  # fmt: skip
 
+REAL = {"friction": 0.6, "payload_kg": 1.0, "action_delay_s": 0.025, "estimator_noise": True}
+
 
 def walking(steps: int, **kwargs) -> Go1Env:
     """An environment in the middle of an episode that its expert drives."""
@@ -39,15 +41,16 @@ def agree(one: Go1Env, two: Go1Env, steps: int, rng_seed: int = 0) -> None:
 
 
 @COPIERS
-@pytest.mark.parametrize("kwargs", [{}, {"noise": True, "control_hz": 100}], ids=["exact", "noisy"])
+@pytest.mark.parametrize("kwargs", [{}, {"noise": True, "control_hz": 100}, REAL], ids=["exact", "noisy", "real"])
 def test_a_copy_in_the_middle_of_an_episode_continues_to_the_bit(duplicate, kwargs):
     env = walking(20, **kwargs)
     agree(env, duplicate(env), 30)
 
 
 @COPIERS
-def test_a_copys_expert_gives_the_same_labels(duplicate):
-    env = walking(20)
+@pytest.mark.parametrize("kwargs", [{}, REAL], ids=["exact", "real"])
+def test_a_copys_expert_gives_the_same_labels(duplicate, kwargs):
+    env = walking(20, **kwargs)
     twin = duplicate(env)
     for _ in range(10):
         action = env.expert_action()

@@ -1,10 +1,13 @@
 """Gait clocks worked by hand, and the contact schedule against a fine numerical integral."""
 
+import copy
 import dataclasses
+import pickle
 
 import numpy as np
 import pytest
 
+from go1_mtl_gym import robot
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.gaits import GAITS, Gait
 
@@ -66,6 +69,41 @@ def test_jump_moves_all_feet_together_and_leaves_the_ground():
     assert (support == 0).mean() == pytest.approx(1 - jump.duty, abs=2e-3)
 
 
+def test_pace_moves_the_legs_of_a_side_together():
+    pace = GAITS["pace"]
+    beats = touchdown_phases(pace)
+    assert beats[0] == beats[2] and beats[1] == beats[3] and abs(beats[0] - beats[1]) == pytest.approx(0.5)
+    assert (pace.period, pace.duty, pace.stance_width, pace.swing_height) == (0.32, 0.55, 0.7, 0.05)
+
+
+def test_gallop_lands_its_front_feet_one_after_the_other_and_then_its_hind_feet():
+    gallop = GAITS["gallop"]  # leg i touches down when phase + offset is a whole cycle: 0, .9, .5, .4
+    np.testing.assert_allclose(touchdown_phases(gallop), [0.0, 0.9, 0.5, 0.4], atol=1e-3)
+    assert (gallop.period, gallop.duty, gallop.stance_width, gallop.swing_height) == (0.32, 0.5, 1.0, 0.06)
+
+
+def test_gaits_that_can_stand_have_all_feet_on_the_ground_at_phase_zero():
+    assert {name: gait.can_stand for name, gait in GAITS.items()} == {
+        "trot": True, "bound": False, "jump": True, "walk": True, "pace": True, "gallop": False,
+    }  # fmt: skip
+
+
+def test_nominal_feet_are_the_standing_robots_with_the_width_scaled():
+    np.testing.assert_array_equal(GAITS["trot"].nominal_feet_b, robot.NOMINAL_FOOT_B)
+    feet = GAITS["pace"].nominal_feet_b  # .7 x (.04675 + .08) = .088725 m from the middle line
+    np.testing.assert_allclose(feet[:, 1], [0.088725, -0.088725, 0.088725, -0.088725])
+    np.testing.assert_array_equal(feet[:, ::2], robot.NOMINAL_FOOT_B[:, ::2])
+    assert feet is GAITS["pace"].nominal_feet_b, "computed once"
+    for copied in (copy.deepcopy(GAITS["pace"]), pickle.loads(pickle.dumps(GAITS["pace"]))):
+        assert copied == GAITS["pace"] and hash(copied) == hash(GAITS["pace"])
+        with pytest.raises(ValueError, match="read-only"):
+            copied.nominal_feet_b[0, 1] = 9.0
+
+
+def test_offsets_may_come_as_any_sequence_of_numbers():
+    assert dataclasses.replace(GAITS["trot"], offsets=np.array([0, 0.5, 0.5, 0])) == GAITS["trot"]
+
+
 @EVERY
 def test_phase_is_periodic(gait):
     phase = np.random.default_rng(0).uniform(0, 1, 50)
@@ -115,6 +153,8 @@ def test_contact_schedule_by_hand():
         ({"duty": 1.0}, "duty.*got 1"),
         ({"duty": float("nan")}, "duty.*nan"),
         ({"swing_height": 0.0}, "swing_height"),
+        ({"stance_width": 0.2}, r"stance_width of gait 'trot' must lie in \[0.3, 1.5\], got 0.2"),
+        ({"stance_width": 1.6}, "stance_width.*got 1.6"),
         ({"offsets": (0.0, 0.5)}, r"offsets.*\(4,\).*\(2,\)"),
         ({"offsets": (0.0, 0.5, float("inf"), 0.0)}, "offsets.*finite"),
     ],

@@ -8,11 +8,11 @@ from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
 
 CONSTRUCTION = [
-    ({"task": "gallop"}, r"task must be one of 'trot', 'bound', 'jump', 'walk'; got 'gallop'"),
+    ({"task": "moonwalk"}, r"task must be one of 'trot', 'bound', 'jump', 'walk', .*; got 'moonwalk'"),
     ({"task": "walk", "tasks": ("trot",)}, r"task must be one of 'trot'; got 'walk'"),
     ({"tasks": "trot"}, r"tasks must be a sequence of task names.*got 'trot'"),
     ({"tasks": ()}, r"tasks must be a sequence.*got \(\)"),
-    ({"tasks": ("trot", "pace")}, r"got 'pace'"),
+    ({"tasks": ("trot", "moonwalk")}, r"got 'moonwalk'"),
     ({"tasks": ("trot", "trot")}, r"differ.*'trot', 'trot'"),
     ({"channels": ("velocity",)}, r"channel must be one of.*'last_action'; got 'velocity'"),
     ({"channels": "command"}, r"channels must be a sequence.*got 'command'"),
@@ -52,14 +52,17 @@ ACTIONS = [
     ([[1.0], [2.0, 3.0]], r"action must be 12 numbers"),
 ]
 RUNNING = [
-    (lambda env: env.set_task("pace"), r"task must be one of .*got 'pace'"),
+    (lambda env: env.set_task("moonwalk"), r"task must be one of .*got 'moonwalk'"),
+    (lambda env: env.set_task("walk", phase=1.0), r"phase \[cycles\] must lie in \[0, 1\), got 1"),
+    (lambda env: env.set_task("walk", phase=-0.1), r"phase.*got -0.1"),
+    (lambda env: env.set_task("walk", phase="late"), r"phase.*got 'late'"),
     (lambda env: env.set_command((0.1, 0.2)), r"command \(vx, vy, yaw rate\) must have shape \(3,\), got shape \(2,\)"),
     (lambda env: env.set_command((9.0, 0.0, 0.0)), r"command.*'trot' must lie within.*got \[9.0, 0.0, 0.0\]"),
     (lambda env: env.set_command((np.nan, 0.0, 0.0)), r"command.*finite.*nan"),
     (lambda env: env.push((1.0, 2.0)), r"push.*shape \(3,\)"),
     (lambda env: env.push((np.inf, 0.0, 0.0)), r"push.*finite"),
     (lambda env: env.reset(options={"speed": 1}), r"reset option must be one of 'command', 'task'; got 'speed'"),
-    (lambda env: env.reset(options={"task": "pace"}), r"got 'pace'"),
+    (lambda env: env.reset(options={"task": "moonwalk"}), r"got 'moonwalk'"),
     (lambda env: env.reset(seed=1, options={"command": (0.0, 5.0, 0.0)}), r"command.*within.*got \[0.0, 5.0, 0.0\]"),
     (lambda env: env.reset(options={"command": "fast"}), r"command.*'fast'"),
 ]
@@ -114,6 +117,7 @@ def test_refused_calls_change_nothing(call, words):
         lambda env: env.step(np.zeros(12)),
         lambda env: env.expert_action(),
         lambda env: env.state,
+        lambda env: env.estimated_state,
         lambda env: env.task,
         lambda env: env.set_task("walk"),
         lambda env: env.set_command((0.1, 0, 0)),

@@ -51,7 +51,7 @@ def test_accelerometer_in_free_fall_reads_nearly_nothing():
     assert not read(env, observation)["contacts"].any()
 
 
-@pytest.mark.parametrize("task", ["trot", "walk"])
+@pytest.mark.parametrize("task", ["bound", "gallop"])  # they cannot stand, so their clocks run at once
 def test_phase_channel_is_sine_and_cosine_of_the_gait_clock(task):
     env = Go1Env(task, channels=ALL)
     observation, _ = env.reset(seed=0)

@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.tasks import TASKS, Task
+from go1_mtl_gym.gaits import GAITS
+from go1_mtl_gym.tasks import PAPER_TASKS, TASKS, Task
 
 EVERY = pytest.mark.parametrize("task", TASKS.values(), ids=list(TASKS))
 
 
 def test_order_is_the_order_of_the_heads():
-    assert tuple(TASKS) == ("trot", "bound", "jump", "walk")
-    assert all(TASKS[name].name == name == TASKS[name].gait.name for name in TASKS)
+    assert tuple(TASKS)[:6] == (*PAPER_TASKS, "pace", "gallop") and PAPER_TASKS == ("trot", "bound", "jump", "walk")
+    assert all(TASKS[name].name == name == TASKS[name].gait.name for name in GAITS)
 
 
 @EVERY

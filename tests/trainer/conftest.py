@@ -12,7 +12,8 @@ torch.set_num_threads(1)
 def policy() -> MultiHeadPolicy:
     """A small untrained student, made the same way every time."""
     env = StubEnv()
-    policy = MultiHeadPolicy(env.observation_space, env.action_space, width=32, seed=3, env_kwargs={"control_hz": 50})
+    shape = {"width": 32, "n_tasks": len(env.tasks), "env_kwargs": {"control_hz": 50}}
+    policy = MultiHeadPolicy(env.observation_space, env.action_space, seed=3, **shape)
     generator = torch.Generator().manual_seed(0)
     for head in policy.actor.heads:  # away from the small initial outputs, so that heads differ visibly
         torch.nn.init.normal_(head[-1].weight, generator=generator)

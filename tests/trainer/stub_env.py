@@ -10,7 +10,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from go1_mtl_gym import TASKS, PerturbationWrapper
+from go1_mtl_gym import PAPER_TASKS, TASKS, PerturbationWrapper
 from go1_mtl_gym.actuation import ActionMap
 from trainers.environments import ExpertAccess, PerturbationConfig
 
@@ -44,7 +44,7 @@ class StubEnv(gymnasium.Env):
     def __init__(
         self,
         task: str = "trot",
-        tasks: tuple[str, ...] = tuple(TASKS),
+        tasks: tuple[str, ...] = PAPER_TASKS,
         episode_s: float = 30.0,
         control_hz: int = 50,
         expert_falls_after_s: float = np.inf,

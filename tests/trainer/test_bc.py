@@ -13,7 +13,7 @@ from trainers import BCConfig, BCTrainer, MultiHeadPolicy, TensorBatches, make_l
 def student(**kwargs) -> MultiHeadPolicy:
     """A small untrained policy."""
     env = StubEnv()
-    return MultiHeadPolicy(env.observation_space, env.action_space, width=32, seed=0, **kwargs)
+    return MultiHeadPolicy(env.observation_space, env.action_space, n_tasks=4, width=32, seed=0, **kwargs)
 
 
 def test_batches_are_balanced_sorted_and_cover_all_rows(demos):

@@ -64,6 +64,21 @@ def test_failed_save_leaves_the_old_file(saved, monkeypatch):
     assert [p.name for p in path.parent.iterdir()] == ["policy.zip"]
 
 
+def test_degrees_of_realism_travel_with_the_policy(tmp_path):
+    kwargs = {"friction": 0.5, "payload_kg": 1.0, "action_delay_s": 0.01, "estimator_noise": True, "tasks": ("trot",)}
+    env = trainers.make_env("trot", **kwargs)
+    policy = MultiHeadPolicy(env.observation_space, env.action_space, width=8, env_kwargs=kwargs)
+    policy.save(tmp_path / "p.zip")
+    again = trainers.load(tmp_path / "p.zip")
+    assert again.env_kwargs == kwargs
+    twin = trainers.make_env("trot", **again.env_kwargs)
+    env.reset(seed=0), twin.reset(seed=0)
+    for _ in range(3):
+        action = env.expert_action()
+        np.testing.assert_array_equal(action, twin.expert_action())
+        np.testing.assert_array_equal(env.step(action)[0], twin.step(action)[0])
+
+
 def test_env_kwargs_must_be_json(saved):
     policy, path = saved
     policy.env_kwargs = {"tasks": object()}

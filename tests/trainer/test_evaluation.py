@@ -10,6 +10,7 @@ from go1_mtl_gym import TASKS
 from go1_mtl_gym.errors import InvalidInputError
 from tests.trainer.stub_env import HIPS, THIGHS, StubEnv, linear_expert, make_stub
 from trainers import evaluate
+from trainers.environments import ExpertAccess
 
 SHORT = {"episodes": 2, "seconds": 6.0, "make_env": make_stub}
 
@@ -47,7 +48,7 @@ def falling(action):
 
 @pytest.mark.parametrize("task", list(TASKS))
 def test_stepping_and_tracking_is_success(task):
-    result = evaluate(Scripted(task), task, **SHORT)
+    result = evaluate(Scripted(task), task, **SHORT, tasks=tuple(TASKS))
     assert result.survival_rate == result.success_rate == 1.0 and result.survival_s == 6.0
     assert result.velocity_error < 0.02 and result.yaw_rate_error < 0.02
     assert result.step_rate == pytest.approx(1 / TASKS[task].gait.period, rel=0.15)
@@ -57,6 +58,58 @@ def test_standing_still_survives_and_fails():
     result = evaluate(Scripted(spoil=still), **SHORT)
     assert result.survival_rate == 1.0 and result.velocity_error < 0.15
     assert result.step_rate == 0.0 and result.success_rate == 0.0
+
+
+class Pausing(StubEnv):
+    """A stub that has its robot stand while the filtered command is small."""
+
+    def info(self, fallen):
+        return super().info(fallen) | {"standing": bool(np.abs(self.filtered).max() < 0.05)}
+
+
+def make_pausing(task, perturbation=None, **env_kwargs):
+    return ExpertAccess(Pausing(task, **env_kwargs))
+
+
+def lifting(every: int):
+    """Lifts all legs for one swing in so many steps, and else stands."""
+    policy = Scripted()
+
+    def spoil(action):
+        action[THIGHS] = 0.9 if policy.calls % every < 6 else 0.0
+        return action
+
+    policy.spoil = spoil
+    return policy
+
+
+@pytest.mark.parametrize(("policy", "success"), [(Scripted(spoil=still), 1.0), (Scripted(), 0.0)])
+def test_a_robot_that_is_to_stand_must_not_step(policy, success):
+    pausing = SHORT | {"make_env": make_pausing, "commands": [(0.0, 0.0, 0.0)]}
+    assert evaluate(policy, **pausing).success_rate == success
+    assert evaluate(policy, **SHORT, commands=[(0.0, 0.0, 0.0)]).success_rate == 1.0 - success, "no such rule here"
+
+
+@pytest.mark.parametrize(("every", "success"), [(150, 1.0), (100, 0.0)])
+def test_a_standing_robot_may_make_one_step_and_not_two(every, success):
+    pausing = {"episodes": 1, "seconds": 5.8, "make_env": make_pausing, "commands": [(0.0, 0.0, 0.0)]}
+    result = evaluate(lifting(every), **pausing)  # touchdowns from 2 s on: at 3.1 s, or at 2.1 and 4.1 s
+    assert result.step_rate == pytest.approx((1 if success else 2) / 3.8) and result.success_rate == success
+
+
+def test_steps_are_counted_against_the_time_in_which_the_clock_ran():
+    def stepping_when_told(action):
+        if np.abs(action[HIPS]).max() < 0.05:
+            action[THIGHS] = 0.0
+        return action
+
+    paused = SHORT | {"make_env": make_pausing, "seconds": 10.0, "command_interval": 3.0, "episodes": 1}
+    with pytest.MonkeyPatch.context() as patch:
+        draws = iter([(9.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.4, 0.0, 0.0), (0.0, 0.0, 0.0)])  # the first: unused
+        patch.setattr("go1_mtl_gym.Task.draw_command", lambda self, rng: np.array(next(draws)))
+        result = evaluate(Scripted(spoil=stepping_when_told), **paused, commands=[(0.4, 0.0, 0.0)])
+    assert result.success_rate == 1.0
+    assert 1.0 < result.step_rate < 2.0, "about half the time at 2.5 steps per second"
 
 
 def test_drifting_fails_by_velocity():

@@ -9,6 +9,7 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.evaluation import evaluate_policy
 
+from go1_mtl_gym import TASKS
 from go1_mtl_gym.errors import InvalidInputError
 from tests.trainer.stub_env import SIZE, StubEnv
 from trainers import MultiHeadPolicy
@@ -67,7 +68,7 @@ def test_depth_is_trunk_two_head_two_and_elu(policy):
 
 def test_pooled_ignores_the_task_id():
     env = StubEnv()
-    pooled = MultiHeadPolicy(env.observation_space, env.action_space, width=16, pooled=True, seed=0)
+    pooled = MultiHeadPolicy(env.observation_space, env.action_space, n_tasks=4, width=16, pooled=True, seed=0)
     obs = np.repeat(observations([0]), 4, axis=0)
     obs[:, -4:] = np.eye(4)
     actions = pooled.predict(obs, deterministic=True)[0]
@@ -93,7 +94,7 @@ def test_nan_observation(policy):
 @pytest.mark.parametrize("mode", ["mean_std", "min_max", "none"])
 def test_normalisation(mode):
     env = StubEnv()
-    policy = MultiHeadPolicy(env.observation_space, env.action_space, width=8, normalization=mode, seed=0)
+    policy = MultiHeadPolicy(env.observation_space, env.action_space, n_tasks=4, width=8, normalization=mode, seed=0)
     obs = observations([0, 1, 2, 3] * 50) * 5 + 2
     obs[:, 30:34] = np.random.default_rng(1).integers(0, 2, (200, 4))
     obs[:, 7] = 0.4  # constant
@@ -148,6 +149,14 @@ def test_seed_fixes_weights_and_spares_the_global_generator():
     assert all(torch.equal(p, q) for p, q in zip(a.parameters(), b.parameters()))
 
 
+def test_heads_are_those_of_the_tasks_named_or_of_all_tasks():
+    env = StubEnv(tasks=("trot", "walk"))
+    named = MultiHeadPolicy(env.observation_space, env.action_space, env_kwargs={"tasks": ["trot", "walk"]})
+    assert named.n_tasks == 2 and named.env_kwargs == {"tasks": ("trot", "walk")}
+    every = MultiHeadPolicy(env.observation_space, env.action_space)
+    assert every.n_tasks == len(TASKS) and every.env_kwargs == {"tasks": tuple(TASKS)}, "a later task is not its own"
+
+
 def test_copies_predict_the_same(policy):
     obs = observations([0, 3, 1])
     expected = policy.predict(obs, deterministic=True)[0]
@@ -172,7 +181,8 @@ def test_exploration_is_small_gaussian_and_clipped(policy):
 
 
 def test_ppo_learns_saves_and_loads(venv, tmp_path):
-    model = PPO(MultiHeadPolicy, venv, n_steps=16, batch_size=32, n_epochs=1, seed=0, device="cpu")
+    kwargs = {"n_steps": 16, "batch_size": 32, "n_epochs": 1, "policy_kwargs": {"n_tasks": 4}}
+    model = PPO(MultiHeadPolicy, venv, **kwargs, seed=0, device="cpu")
     before = copy.deepcopy(model.policy.state_dict())
     model.learn(64)
     assert any(not torch.equal(before[k], v) for k, v in model.policy.state_dict().items() if k.startswith("actor"))

@@ -1,0 +1,120 @@
+"""The gait clock and the command filter, worked by hand, and what the environment makes of them."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from go1_mtl_gym import GAITS, TASKS, robot
+from go1_mtl_gym.clock import STAND_COMMAND, asks_to_stand, is_standing, next_phase
+from go1_mtl_gym.env import Go1Env
+from go1_mtl_gym.episode import COMMAND_SLEW, filtered
+
+TROT, BOUND = GAITS["trot"], GAITS["bound"]
+STILL, GOING = np.zeros(3), np.array([0.3, 0.0, 0.0])
+
+
+def home(env: Go1Env) -> np.ndarray:
+    return env.action_map.from_radians(robot.HOME_POSE)
+
+
+def test_the_clock_by_hand():
+    assert next_phase(TROT, 0.9, GOING, 0.06) == pytest.approx(0.05)  # .06 s of a period of .4 s are .15 cycles
+    assert next_phase(TROT, 0.9, STILL, 0.06) == 0.0, "it stops at the next phase 0, exactly"
+    assert next_phase(TROT, 0.8, STILL, 0.06) == pytest.approx(0.95), "and not before"
+    assert next_phase(TROT, 0.0, STILL, 0.06) == 0.0
+    assert next_phase(TROT, 0.0, GOING, 0.06) == pytest.approx(0.15)
+    assert next_phase(BOUND, 0.0, STILL, 0.08) == pytest.approx(0.25), "a bound cannot stand"
+    assert next_phase(TROT, 1.0 - 1e-12, STILL, 1e-15) == 0.0, "a sum that ends just below a whole cycle is whole"
+
+
+def test_the_box_of_commands_that_ask_for_a_stand():
+    assert STAND_COMMAND == (0.02, 0.02, 0.04)
+    for axis in range(3):
+        for sign in (-1, 1):
+            command = np.zeros(3)
+            command[axis] = sign * (STAND_COMMAND[axis] - 1e-9)
+            assert is_standing(TROT, 0.0, command) and not is_standing(BOUND, 0.0, command)
+            assert not is_standing(TROT, 1e-9, command)
+            command[axis] = sign * STAND_COMMAND[axis]
+            assert not asks_to_stand(TROT, command)
+
+
+def test_the_filter_by_hand():
+    assert COMMAND_SLEW == (4.0, 4.0, 8.0)
+    share = 1 - np.exp(-0.1)  # .02 s of .2 s
+    np.testing.assert_allclose(filtered(np.array([0.4, 0, 0]), STILL, 0.02), [0.4 * share, 0, 0])
+    # 2 m/s would be followed by .19 m/s in .02 s; the limit is 4 x .02 = .08. Likewise 2 rad/s: .19 becomes .16.
+    np.testing.assert_allclose(filtered(np.array([2.0, -2.0, -2.0]), STILL, 0.02), [0.08, -0.08, -0.16])
+    np.testing.assert_allclose(filtered(STILL, np.array([1.0, 0.1, 0.0]), 0.02), [0.92, 0.1 - 0.1 * share, 0.0])
+
+
+@pytest.mark.parametrize("seconds", [0.001, 0.005, 0.02])
+def test_the_filter_never_exceeds_its_slope_and_arrives(seconds):
+    command, seen = np.array([-2.0, 0.6, 2.0]), [np.array([2.0, -0.6, -2.0])]
+    for _ in range(round(3.0 / seconds)):
+        seen.append(filtered(command, seen[-1], seconds))
+    slopes = np.abs(np.diff(seen, axis=0)) / seconds
+    assert (slopes <= np.array(COMMAND_SLEW) + 1e-9).all() and slopes[0].tolist() == pytest.approx([4.0, 4.0, 8.0])
+    np.testing.assert_allclose(seen[-1], command, atol=1e-3)
+
+
+def test_a_stand_ends_with_the_command_and_begins_at_a_whole_cycle():
+    env = Go1Env("trot")
+    _, info = env.reset(seed=0, options={"command": (0.0, 0.0, 0.0)})
+    assert info["standing"] and env.state.standing
+    for _ in range(10):
+        *_, info = env.step(home(env))
+        assert info["standing"] and info["phase"] == 0.0
+    env.set_command((0.3, 0.0, 0.0))
+    phases = [env.step(home(env))[4]["phase"] for _ in range(8)]
+    # One period until the command is seen, then .02 s of .4 s are .05 cycles each.
+    np.testing.assert_allclose(phases, 0.05 * np.arange(8), atol=1e-12)
+    env.set_command((0.0, 0.0, 0.0))
+    infos = [env.step(home(env))[4] for _ in range(60)]
+    began = next(i for i, info in enumerate(infos) if info["standing"])
+    assert infos[began]["phase"] == 0.0 and infos[began - 1]["phase"] == pytest.approx(0.95)
+    assert not any(info["standing"] for info in infos[:began]) and all(info["standing"] for info in infos[began:])
+    assert np.abs(infos[began]["filtered_command"][0]) < STAND_COMMAND[0]
+
+
+@pytest.mark.parametrize("control_hz", [50, 200, 1000])
+@pytest.mark.parametrize("task", TASKS)
+def test_only_gaits_that_can_stand_do(task, control_hz):
+    env = Go1Env(task, control_hz=control_hz)
+    env.reset(seed=0, options={"command": (0.0, 0.0, 0.0)})
+    env.step(home(env))
+    stands = task in ("trot", "jump", "walk", "pace")
+    assert env.task.gait.can_stand is stands is env.state.standing and (env.state.phase == 0.0) is stands
+
+
+def test_standing_is_a_function_of_gait_phase_and_command():
+    env = Go1Env("trot")
+    env.reset(seed=0, options={"command": (0.0, 0.0, 0.0)})
+    assert env.state.standing
+    assert not dataclasses.replace(env.state, phase=0.5).standing
+    assert not dataclasses.replace(env.state, command=np.array([0.02, 0.0, 0.0])).standing
+    assert not dataclasses.replace(env.state, gait=BOUND).standing
+
+
+def test_the_state_tells_the_time():
+    env = Go1Env("trot", control_hz=100)
+    env.reset(seed=0)
+    assert env.state.time_s == 0.0
+    for _ in range(7):
+        env.step(home(env))
+    assert env.state.time_s == pytest.approx(0.07) == pytest.approx(env.simulation.data.time)
+    env.reset()
+    assert env.state.time_s == 0.0
+
+
+def test_a_new_task_can_begin_at_a_phase():
+    env = Go1Env("trot")
+    env.reset(seed=0, options={"command": (0.3, 0.0, 0.0)})
+    env.step(home(env))
+    env.set_task("bound", phase=0.25)
+    assert env.state.phase == 0.25 and env.task.name == "bound"
+    *_, info = env.step(home(env))
+    assert info["phase"] == pytest.approx(0.25 + 0.02 / 0.32)
+    env.set_task("walk")
+    assert env.state.phase == info["phase"]
