@@ -1,4 +1,4 @@
-"""How fast is the expert, next to a public controller of the same kind and next to exact QP solvers?
+"""How fast is the expert, next to itself with exact QP solvers and next to a public controller of its kind?
 
     python benchmarks/expert.py                                  ours, and piqp and daqp where they are installed
     python benchmarks/expert.py --go2-convex-mpc PATH            and a checkout of that repository
@@ -13,17 +13,14 @@ import shlex
 import sys
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from peers import SOLVERS, Go2ConvexMPC, MissingPeer
+from peers import Go2ConvexMPC, MissingPeer
 from threadpoolctl import threadpool_limits
 
 from experts import MPCConfig, NMPCConfig, NMPCExpert
-from experts.dynamics import FORCE_UNIT
-from experts.mpc import NU, NX
 from go1_mtl_gym import TASKS, Go1Env, Go1Error
 from go1_mtl_gym.state import RobotState
 from go1_mtl_gym.validation import number_in
@@ -31,7 +28,9 @@ from trainers.checkpoint import versions
 from trainers.files import write_json
 from trainers.report import benchmark_table
 
-OURS = "ours, OSQP"
+OURS = "ours, osqp"
+EXACT = ("daqp", "piqp")
+"""Exact solvers that the expert can use instead; the first one at hand is what errors are counted from."""
 COMMAND = (0.3, 0.0, 0.0)
 SCOPES = {
     "qp": "QP: from its matrices to a solution",
@@ -57,7 +56,14 @@ def walk(task: str, count: int, seed: int) -> Iterator[RobotState]:
 
 
 class Ours:
-    """Our expert with some settings of its QP solver."""
+    """Our expert with some settings of its MPC.
+
+    Args:
+        config: the settings.
+
+    Raises:
+        ImportError: if the QP solver is not installed.
+    """
 
     def __init__(self, config: MPCConfig) -> None:
         self.expert = NMPCExpert(config=NMPCConfig(mpc=config))
@@ -81,45 +87,18 @@ class Ours:
         return {"qp": both - data, "update": update, "action": _seconds(lambda: self.expert.action(state))}
 
 
-class ExactSolver:
-    """Another solver on the QP that our expert has just solved.
-
-    Args:
-        name: in `SOLVERS`.
-        ours: whose QP it is.
-    """
-
-    def __init__(self, name: str, ours: Ours) -> None:
-        self._ours = ours
-        config = ours.expert.config.mpc
-        self._solver = SOLVERS[name](ours.expert._mpc.program, equalities=config.steps * NX)
-        self.forces_w = np.zeros((4, 3))
-        self._first = slice(config.steps * NX, config.steps * NX + NU)
-
-    def __call__(self, state: RobotState) -> dict[str, float]:
-        program = self._ours.expert._mpc.program
-        seconds = _seconds(lambda: self._solver.solve(program))
-        self.forces_w = self._solver.x[self._first].reshape(4, 3) * FORCE_UNIT
-        return {"qp": seconds}
-
-
 def contestants(options: argparse.Namespace) -> dict[str, Call]:
     """Who takes part; who is absent is named on standard error, unless asked for by path.
 
     Raises:
         MissingPeer: if the checkout that was asked for cannot be used.
     """
-    ours = Ours(MPCConfig())
-    calls: dict[str, Call] = {OURS: ours}
-    known = {field.name for field in fields(MPCConfig)}
-    for name in SOLVERS:
+    calls: dict[str, Call] = {OURS: Ours(MPCConfig())}
+    for name in EXACT:
         try:
-            calls[name] = ExactSolver(name, ours)
+            calls[f"ours, {name}"] = Ours(MPCConfig(solver=name))
         except ImportError as error:
             print(f"{name} is left out: {error}; pip install {name}", file=sys.stderr)
-            continue
-        if "solver" in known:  # the expert itself can use it
-            calls[f"ours, {name}"] = Ours(replace(MPCConfig(), solver=name))
     if options.go2_convex_mpc is not None:
         gait = TASKS[options.task].gait
         calls["go2-convex-mpc"] = Go2ConvexMPC(options.go2_convex_mpc, gait, COMMAND)
@@ -162,13 +141,10 @@ def compare(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _force_errors(calls: dict[str, Call]) -> dict[str, float]:
-    """Largest difference of a force component from daqp's solution, which is exact to 1e-6 [N]."""
-    if "daqp" not in calls:
-        return {}
-    exact = calls["daqp"].forces_w
-    found = {name: call.forces_w for name, call in calls.items() if isinstance(call, ExactSolver) and name != "daqp"}
-    found |= {name: call.solution.forces_w for name, call in calls.items() if isinstance(call, Ours)}
-    return {name: float(np.abs(forces - exact).max()) for name, forces in found.items()}
+    """Largest difference of a force component from an exact solver's solution of the same problem [N]."""
+    ours = {name: call.solution.forces_w for name, call in calls.items() if isinstance(call, Ours)}
+    exact = next((ours[f"ours, {name}"] for name in EXACT if f"ours, {name}" in ours), None)
+    return {} if exact is None else {name: float(np.abs(forces - exact).max()) for name, forces in ours.items()}
 
 
 def _seconds(call: Callable[[], Any]) -> float:

@@ -1,90 +1,19 @@
-"""Those that the expert is compared with: exact QP solvers, and a public convex MPC of the Unitree Go2.
-
-None of them is needed to use this project, and none of their code is in it.
-"""
+"""A public controller that the expert is compared with; it is not needed otherwise, and none of its code is here."""
 
 import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from scipy import sparse
 
 from experts.model import to_pinocchio
-from experts.mpc import QuadraticProgram
 from go1_mtl_gym import Gait
 from go1_mtl_gym.state import RobotState
-
-HUGE = 1e30
-"""What these solvers take for infinity."""
 
 
 class MissingPeer(Exception):
     """A checkout that was asked for cannot be used; the message says what is missing."""
-
-
-# -- Exact solvers -----------------------------------------------------------------------------------------------------
-
-
-class PIQP:
-    """The proximal interior point solver piqp, sparse, set up once and updated.
-
-    Args:
-        program: the first problem; later ones have its pattern.
-        equalities: number of its leading rows with l = u.
-    """
-
-    def __init__(self, program: QuadraticProgram, equalities: int) -> None:
-        import piqp
-
-        self._m = equalities
-        self._solver = piqp.SparseSolver()
-        self._solver.settings.verbose = False
-        self._solver.setup(sparse.csc_matrix(program.P), program.q, *self._rows(program))
-        self.x = np.zeros_like(program.q)
-
-    def _rows(self, program: QuadraticProgram) -> tuple[Any, ...]:
-        m, A = self._m, program.A.tocsr()
-        low, high = (np.clip(bound[m:], -HUGE, HUGE) for bound in (program.l, program.u))
-        return A[:m].tocsc(), program.l[:m], A[m:].tocsc(), low, high
-
-    def solve(self, program: QuadraticProgram) -> None:
-        """Update and solve; the solution is in `x`."""
-        A, b, G, low, high = self._rows(program)
-        self._solver.update(c=program.q, A=A, b=b, G=G, h_l=low, h_u=high)
-        self._solver.solve()
-        self.x = np.asarray(self._solver.result.x)
-
-
-class DAQP:
-    """The dense dual active-set solver daqp; it begins anew at every problem.
-
-    Args:
-        program: the first problem.
-        equalities: number of its leading rows with l = u.
-    """
-
-    def __init__(self, program: QuadraticProgram, equalities: int) -> None:
-        import daqp
-
-        self._solve = daqp.solve
-        self._hessian = program.P.toarray()
-        self.x = np.zeros_like(program.q)
-
-    def solve(self, program: QuadraticProgram) -> None:
-        """Solve; the solution is in `x`."""
-        low, high = np.maximum(program.l, -HUGE), np.minimum(program.u, HUGE)
-        kinds = np.where(program.l == program.u, 5, 0).astype(np.int32)
-        self.x = self._solve(self._hessian, program.q.copy(), program.A.toarray(order="C"), high, low, kinds)[0]
-
-
-SOLVERS = {"piqp": PIQP, "daqp": DAQP}
-"""Name (also of the package on PyPI) -> solver."""
-
-
-# -- A public controller -----------------------------------------------------------------------------------------------
 
 
 class Go2ConvexMPC:

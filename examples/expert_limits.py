@@ -167,7 +167,9 @@ def _kick(lab: Lab, task: str, direction: str, size: float, k: int, config: Push
     if not lab.walk(config.before_s):
         return False
     wanted, pace = k / config.phases, lab.env.control_s / TASKS[task].gait.period
-    while (lab.env.state.phase - wanted + 1e-9) % 1.0 >= pace:
+    for _ in range(round(1 / pace) + 1):
+        if (lab.env.state.phase - wanted + 1e-9) % 1.0 < pace:
+            break
         if lab.step()["fallen"]:
             return False
     yaw, (x, y) = lab.env.state.rpy[2], DIRECTIONS[direction]

@@ -9,7 +9,8 @@ from expert_lab import Lab, generator
 from expert_limits import CRUISE
 
 from go1_mtl_gym import TASKS, Gait, robot
-from go1_mtl_gym.simulation import PHYSICS_HZ
+from go1_mtl_gym.actuation import PHYSICS_HZ
+from go1_mtl_gym.clock import next_phase
 
 SATURATED = 0.999
 """A joint is at its limit from this share of it."""
@@ -51,12 +52,11 @@ class Recorder:
         del self._simulation.step  # the class's own shows again
 
     def _recorded(self, target: np.ndarray, physics_steps: int) -> None:
-        clock = self.lab.env.state.phase
-        period = self.lab.env.task.gait.period
+        begun = self.lab.env.state  # the clock moves on after the physics
         for i in range(physics_steps):
             self._step(target, 1)
             state = self.lab.env.state
-            self._note("phase", (clock + (i + 1) / PHYSICS_HZ / period) % 1.0)
+            self._note("phase", next_phase(begun.gait, begun.phase, begun.command, (i + 1) / PHYSICS_HZ))
             self._note("contacts", state.contacts)
             self._note("torque", self._simulation.torque)
             self._note("joint_velocity", state.v)

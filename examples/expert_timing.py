@@ -11,11 +11,16 @@ import numpy as np
 from expert_lab import Lab
 from expert_limits import CRUISE, PushConfig, largest_push
 
-import experts
-from go1_mtl_gym.simulation import PHYSICS_HZ
+from experts import NMPCConfig, NMPCExpert
+from experts.whole_body import WHOLE_BODY
+from go1_mtl_gym.actuation import PHYSICS_HZ
 from go1_mtl_gym.state import RobotState
 
-MODES = {"default": experts.NMPCConfig()}
+MODES = {
+    "default": NMPCConfig(),
+    "real-time iterations": NMPCConfig(linearisation="shifted"),
+    "up to 5 SQP iterations": NMPCConfig(sqp_iterations=5),
+} | {f"whole body: {name}": NMPCConfig(whole_body=name) for name in WHOLE_BODY if name != NMPCConfig().whole_body}
 """Settings of the expert that are compared with each other, by name."""
 MODE_TASKS = ("trot", "bound", "jump")
 """Gaits on which they are compared."""
@@ -54,7 +59,7 @@ class ModesConfig:
 
 def make_mode(name: str) -> Callable[..., Any]:
     """What makes an expert with the settings of that name, for the environment's argument `expert`."""
-    return partial(experts.NMPCExpert, config=MODES[name])
+    return partial(NMPCExpert, config=MODES[name])
 
 
 # -- Time --------------------------------------------------------------------------------------------------------------

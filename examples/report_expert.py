@@ -120,7 +120,7 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     add("--seed", type=int, default=1, help="of commands, resets and kicks")
     add("--n-jobs", type=int, default=os.cpu_count() or 1, help="processes")
     add("--control-hz", type=int, default=50, help="rate of the expert and of the joint targets [Hz]")
-    add("--soak-steps", type=int, default=None, help="control steps of the long walk, over all gaits")
+    add("--soak-steps", type=int, default=None, help="control steps of the long walk, over all gaits; None: 35000 each")
     add("--parts", type=Path, default=PARTS, help="folder of finished parts, from which an interrupted run goes on")
     add("--out", type=Path, default=OUT, help="file of the results; figures go beside it")
     options = parser.parse_args(arguments)

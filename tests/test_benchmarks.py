@@ -27,20 +27,19 @@ def result(tmp_path_factory):
 
 def test_ours_is_timed_from_the_inside_out(result):
     done, text, out = result
-    times = json.loads(text)["times_ms"]["ours, OSQP"]
+    times = json.loads(text)["times_ms"]["ours, osqp"]
     assert 0 < times["qp"]["median"] < times["action"]["median"] < 100 and times["update"]["median"] > 0
     assert str(out.parent) not in text, "no path of the machine"
-    assert "| ours, OSQP |" in done.stdout and "| 1.00 |" in done.stdout
+    assert "| ours, osqp |" in done.stdout and "| 1.00 |" in done.stdout
 
 
 @pytest.mark.parametrize("name", ["piqp", "daqp"])
 def test_exact_solvers_agree_or_are_named_as_missing(result, name):
     done, text, _ = result
-    if name not in json.loads(text)["times_ms"]:
+    if f"ours, {name}" not in json.loads(text)["times_ms"]:
         assert f"{name} is left out" in done.stderr and f"pip install {name}" in done.stderr
         return
-    errors = json.loads(text)["force_error_n"]
-    assert "daqp" not in json.loads(text)["times_ms"] or errors["ours, OSQP"]["largest"] < 1.0
+    assert all(error["largest"] < 2.0 for error in json.loads(text)["force_error_n"].values())
 
 
 def test_a_folder_that_is_no_checkout_is_refused(tmp_path):
