@@ -1,8 +1,10 @@
 """The expert's report card: how well, how far, how hard and how fast it goes, every gait, every figure measured.
 
-python examples/report_expert.py                                    everything; Ctrl-C and the same command goes on
-python examples/report_expert.py --tasks trot --sections pushes     only some of it
-python examples/report_expert.py --quick --out quick.json           a minute's worth, to see that everything works
+python examples/report_expert.py                               everything; Ctrl-C and the same command goes on
+python examples/report_expert.py --tasks trot --sections pushes --out p.json   only some of it
+python examples/report_expert.py --quick --out quick.json      a minute's worth, to see that everything works
+
+The file holds what this command asked for and nothing else; whatever part was measured before is taken from --parts.
 """
 
 import argparse
