@@ -51,4 +51,4 @@ test-newest: .venv-newest/.installed-test
 
 clean:
 	rm -rf .venv .venv-newest build dist *.egg-info .pytest_cache .ruff_cache
-	find go1_mtl_gym experts trainers examples tests -name __pycache__ -prune -exec rm -rf {} +
+	find go1_mtl_gym experts trainers examples benchmarks tests -name __pycache__ -prune -exec rm -rf {} +

@@ -4,8 +4,8 @@
     python examples/publish_results.py              write both from what docs/results/ holds already
     python examples/publish_results.py --check      change nothing; fail if README.md or the page is out of date
 
-No table of results in README.md is typed by hand: runs come from ``docs/results/metrics.json`` and ``expert.json``,
-gaits and presets from the code.
+No table of results in README.md is typed by hand: runs come from ``metrics.json``, ``expert.json`` and
+``benchmark_expert.json`` in ``docs/results/``, gaits and presets from the code.
 """
 
 import argparse
@@ -13,16 +13,17 @@ import json
 import shlex
 import shutil
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from dagger_config import PRESETS, JobConfig
+from expert_page import PICTURES, expert_block, expert_section
 
 from go1_mtl_gym import TASKS, env_id
 from go1_mtl_gym.errors import InvalidInputError
 from trainers.files import write_atomically, write_json
-from trainers.report import closed_loop_table, markdown, paper_table, results_table, seconds_table
+from trainers.report import benchmark_table, markdown, paper_table, results_table, seconds_table
 
 ROOT = Path(__file__).resolve().parents[1]
 COPIED = ("joint_targets.png", "gaits.gif")
@@ -89,12 +90,12 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def without_out(command: str) -> str:
-    """A command line without ``--out`` and its value."""
+    """A command line without ``--out`` and ``--parts``, folders that only its machine knows, and their values."""
     words, kept = iter(shlex.split(command)), []
     for word in words:
-        if word == "--out":
+        if word in ("--out", "--parts"):
             next(words, None)
-        elif not word.startswith("--out="):
+        elif not word.startswith(("--out=", "--parts=")):
             kept.append(word)
     return shlex.join(kept)
 
@@ -110,13 +111,6 @@ def results_block(metrics: Mapping[str, Any]) -> str:
 def paper_block(metrics: Mapping[str, Any]) -> str:
     """R2 here and in the paper, for README.md."""
     return paper_table(metrics)
-
-
-def expert_block(expert: Mapping[str, Any]) -> str:
-    """The expert's scores, for README.md."""
-    config = expert["config"]
-    what = f"{config['episodes']} drawn commands x {config['episode_s']:g} s per gait at {config['control_hz']} Hz"
-    return "\n\n".join([closed_loop_table(expert["tasks"]), f"{what}. {_made_by(expert)}"])
 
 
 def gaits_block() -> str:
@@ -139,8 +133,20 @@ def presets_block() -> str:
     return markdown(["", *(f"`{name}`" for name in PRESETS)], rows)
 
 
-def results_page(metrics: Mapping[str, Any], expert: Mapping[str, Any] | None) -> str:
-    """``docs/results/README.md``."""
+def results_page(
+    metrics: Mapping[str, Any],
+    expert: Mapping[str, Any] | None,
+    pictures: Sequence[str] = (),
+    benchmark: Mapping[str, Any] | None = None,
+) -> str:
+    """``docs/results/README.md``.
+
+    Args:
+        metrics: of the main job.
+        expert: its report, if there is one.
+        pictures: names of the expert's pictures that are there.
+        benchmark: of the expert against others, if there is one.
+    """
     parts = [
         "# Results",
         "Written by `examples/publish_results.py` from the files beside it; do not edit.",
@@ -157,7 +163,9 @@ def results_page(metrics: Mapping[str, Any], expert: Mapping[str, Any] | None) -
         seconds_table(metrics["seconds"]),
     ]
     if expert is not None:
-        parts += ["## Expert", expert_block(expert)]
+        parts += expert_section(expert, _made_by(expert), pictures)
+    if benchmark is not None:
+        parts += ["## Expert against others", benchmark_table(benchmark), f"Made by `{benchmark['command']}`."]
     versions = [[name, str(value)] for name, value in metrics["versions"].items()]
     parts += ["## Versions", markdown(["package", "version"], versions, text_columns=2)]
     return "\n\n".join(parts) + "\n"
@@ -185,7 +193,8 @@ def current_blocks(results: Path) -> dict[str, str]:
         metrics = read_json(results / "metrics.json")
         blocks |= {"results": results_block(metrics), "paper": paper_block(metrics)}
     if (results / "expert.json").is_file():
-        blocks["expert"] = expert_block(read_json(results / "expert.json"))
+        expert = read_json(results / "expert.json")
+        blocks["expert"] = expert_block(expert, _made_by(expert))
     return blocks
 
 
@@ -196,16 +205,18 @@ def pages(root: Path) -> dict[Path, str]:
         raise InvalidInputError(f"there is no {readme}")
     texts = {readme: rewrite(readme.read_text(encoding="utf-8"), current_blocks(results))}
     if (results / "metrics.json").is_file():
-        expert = results / "expert.json"
-        known = read_json(expert) if expert.is_file() else None
-        texts[results / "README.md"] = results_page(read_json(results / "metrics.json"), known)
+        files = [results / f"{name}.json" for name in ("metrics", "expert", "benchmark_expert")]
+        metrics, expert, benchmark = (read_json(path) if path.is_file() else None for path in files)
+        pictures = [name for name in PICTURES if (results / f"expert_{name}.png").is_file()]
+        texts[results / "README.md"] = results_page(metrics, expert, pictures, benchmark)
     return texts
 
 
 def _made_by(scores: Mapping[str, Any]) -> str:
     minutes = sum(scores["seconds"].values()) / 60
     command = without_out(scores["command"])
-    return f"Made by `{command}`, seed {scores['seed']}, in {minutes:.0f} min of wall time."
+    time = "on one core" if "report" in scores else "of wall time"
+    return f"Made by `{command}`, seed {scores['seed']}, in {minutes:.0f} min {time}."
 
 
 def _setting(config: JobConfig, name: str) -> str:

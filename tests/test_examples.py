@@ -18,8 +18,8 @@ CLOSED_LOOP = {"survival_rate", "survival_s", "velocity_error", "step_rate", "su
 ONE_STEP = {"mse", "mae", "r2", "r2_joint_mean"}
 
 
-def start(*arguments: str) -> subprocess.Popen:
-    command = [sys.executable, str(ROOT / "examples" / "dagger.py"), *arguments]
+def start(*arguments: str, script: str = "dagger.py") -> subprocess.Popen:
+    command = [sys.executable, str(ROOT / "examples" / script), *arguments]
     return subprocess.Popen(
         command,
         cwd=ROOT,
@@ -116,3 +116,26 @@ def test_a_finished_run_is_not_repeated_and_other_settings_are_refused(smoke):
     output, _ = process.communicate(timeout=120)
     assert process.returncode == 2 and "other settings (seed)" in output
     assert before == ((out / "policy.zip").stat().st_mtime_ns, (out / "metrics.json").read_text())
+
+
+@pytest.mark.slow
+def test_the_report_goes_on_after_an_interruption(tmp_path):
+    out, parts = tmp_path / "expert.json", tmp_path / "parts"
+    arguments = ["--quick", "--tasks", "trot", "walk", "--sections", "survival", "transitions"]
+    arguments += ["--n-jobs", "2", "--parts", str(parts), "--out", str(out)]
+    process = start(*arguments, script="report_expert.py")
+    deadline = time.monotonic() + 120
+    while not list(parts.glob("survival-*.json")):
+        assert process.poll() is None and time.monotonic() < deadline, process.communicate()[0][-4000:]
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGINT)
+    output, _ = process.communicate(timeout=60)
+    assert process.returncode == 130 and "goes on from there" in output, output[-4000:]
+    assert not out.exists()
+    finished = {path: path.stat().st_mtime_ns for path in parts.glob("[!.]*.json")}
+    output = finish(start(*arguments, script="report_expert.py"))
+    assert finished and all(path.stat().st_mtime_ns == written for path, written in finished.items())
+    scores = json.loads(out.read_text(encoding="utf-8"))
+    assert list(scores["tasks"]) == ["trot", "walk"] and "| trot | 1/1 |" in output
+    assert scores["report"]["transitions"]["trot"]["walk"]["trials"] == 1
+    assert (tmp_path / "expert_transitions.png").is_file()

@@ -11,7 +11,6 @@ from go1_mtl_gym.errors import InvalidInputError
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "examples"))
 
-import evaluate_expert  # noqa: E402
 import publish_results as publish  # noqa: E402
 
 CLOSED = {
@@ -38,7 +37,7 @@ EXPERT = {
     "seed": 1,
     "versions": {},
     "seconds": {"evaluation": 240.0},
-    "command": "python examples/evaluate_expert.py",
+    "command": "python examples/report_expert.py --parts /home/somebody/parts",
 }
 BEGIN, END = "<!-- gaits:begin -->", "<!-- gaits:end -->"
 README = "\n".join(
@@ -102,6 +101,24 @@ def test_the_experts_numbers_come_from_its_file(run, root):
         assert "20 drawn commands x 30 s per gait at 50 Hz" in text
 
 
+def test_the_report_card_takes_the_scores_place_once_it_is_there(run, root):
+    publish.main([str(run)], root)
+    results = root / "docs" / "results"
+    kicks = {"trot": {"left": 1.7, "right": 1.6, "lateral": 1.6}}
+    counts = ("calls", "bad_actions", "unhandled", "solver_failures", "inexact_solves", "bad_states")
+    totals = dict.fromkeys(counts, 3) | {"wanted": 1000000, "passed": False}
+    (results / "expert.json").write_text(json.dumps(EXPERT | {"report": {"pushes": kicks}, "totals": totals}))
+    (results / "expert_pushes.png").write_bytes(b"png")
+    assert publish.main([], root) == 0
+    page, readme = (path.read_text(encoding="utf-8") for path in (results / "README.md", root / "README.md"))
+    for text in (page, readme):
+        assert "| trot | 19/20 | 0.031 (> 0.03) | -, - | - | - | 1.6 | - | - | - | - |" in text
+        assert "Made by `python examples/report_expert.py`, seed 1, in 4 min on one core." in text
+    assert "| trot | 1.7 | 1.6 | - | - |" in page and "](expert_pushes.png)" in page
+    assert "](expert_limits.png)" not in page and "3 control steps" in page
+    assert publish.main(["--check"], root) == 0
+
+
 def test_publishing_twice_changes_nothing(run, root, capsys):
     publish.main([str(run)], root)
     before = (root / "README.md").read_text(encoding="utf-8")
@@ -147,7 +164,13 @@ def test_a_missing_readme_is_an_error(tmp_path, capsys):
 
 @pytest.mark.parametrize(
     ("options", "shown"),
-    [("", ""), (" --seed 1 --out '/a b/c' --rounds 2", " --seed 1 --rounds 2"), (" --out=/a", ""), (" --out", "")],
+    [
+        ("", ""),
+        (" --seed 1 --out '/a b/c' --rounds 2", " --seed 1 --rounds 2"),
+        (" --out=/a", ""),
+        (" --out", ""),
+        (" --parts /a --quick --parts=/b", " --quick"),
+    ],
 )
 def test_the_output_folder_is_cut_from_a_command(options, shown):
     assert publish.without_out("python examples/dagger.py" + options) == "python examples/dagger.py" + shown
@@ -165,22 +188,3 @@ def test_gaits_and_presets_come_from_the_code():
 
 def test_what_is_committed_is_up_to_date(capsys):
     assert publish.main(["--check"]) == 0, capsys.readouterr().out + "run examples/publish_results.py"
-
-
-def test_the_experts_evaluation_writes_its_records(tmp_path, capsys):
-    out = tmp_path / "new" / "expert.json"
-    arguments = ["--tasks", "trot", "--episodes", "2", "--seconds", "3", "--n-jobs", "1", "--out", str(out)]
-    assert evaluate_expert.main(arguments) == 0
-    assert "| trot | 2/2 | 2/2 |" in capsys.readouterr().out
-    scores = json.loads(out.read_text())
-    assert len(scores["tasks"]["trot"]["episodes"]) == 2 and scores["tasks"]["trot"]["velocity_error"] < 0.1
-    assert scores["seed"] == 1 and scores["config"]["control_hz"] == 50
-    assert {"mujoco", "osqp", "pin"} <= set(scores["versions"]) and "--episodes 2" in scores["command"]
-    assert str(tmp_path) not in out.read_text(), "no path of the machine"
-    assert "| trot | 2/2 | 2/2 |" in publish.expert_block(scores)
-
-
-def test_impossible_settings_of_the_evaluation_are_an_error(tmp_path, capsys):
-    out = tmp_path / "expert.json"
-    assert evaluate_expert.main(["--tasks", "trot", "--episodes", "0", "--out", str(out)]) == 2
-    assert "episodes must be >= 1" in capsys.readouterr().err and not out.exists()

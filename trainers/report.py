@@ -99,6 +99,23 @@ def seconds_table(seconds: Mapping[str, float]) -> str:
     return markdown(["stage", "wall time [s]"], rows, text_columns=1)
 
 
+def benchmark_table(result: Mapping[str, Any]) -> str:
+    """One row per thing timed and contestant of ``benchmarks/expert.py``.
+
+    Args:
+        result: {"scopes": {scope: meaning}, "times_ms": {contestant: {scope: {"median", "p99"}}}, "ratio_to_ours":
+            {contestant: {scope: ratio}}}.
+    """
+    rows = []
+    for scope, meaning in result["scopes"].items():
+        for name, own in result["times_ms"].items():
+            if scope in own:
+                times = [f"{own[scope][quantile]:.2f}" for quantile in ("median", "p99")]
+                rows.append([meaning, name, *times, f"{result['ratio_to_ours'][name][scope]:.2f}"])
+    header = ["timed", "contestant", "median [ms]", "p99 [ms]", "in units of ours"]
+    return markdown(header, rows, text_columns=2)
+
+
 def markdown(header: Sequence[str], rows: Sequence[Sequence[str]], text_columns: int = 1) -> str:
     """A Markdown table; the first `text_columns` columns are set left, the others right. No newline at its end."""
     rule = [":--" if i < text_columns else "--:" for i in range(len(header))]
