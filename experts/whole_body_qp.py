@@ -168,8 +168,9 @@ class WholeBodyQP:
         if y is None:
             self.failures += 1
             return closed
-        y[:12] = np.clip(y[:12], -self._torque_limit, self._torque_limit)
-        return y[:12] * _TORQUE_UNIT, program.response[6:] @ y + program.free[6:]
+        torque = np.clip(y[:12] * _TORQUE_UNIT, -robot.TORQUE_LIMIT, robot.TORQUE_LIMIT)
+        y[:12] = torque / _TORQUE_UNIT
+        return torque, program.response[6:] @ y + program.free[6:]
 
     def program(
         self, dynamics: Dynamics, forces_w: np.ndarray, stance: np.ndarray, swing_acceleration_w: np.ndarray
