@@ -12,7 +12,8 @@ the velocity of the body at the leg (heading frame) and x the foot's place relat
 as `experts.footholds` and `experts.swing` plan it; the body's vertical velocity and its roll and pitch rates are those
 of `experts.nominal`, and a foot touches the ground in stance and while it waits for it (the share `early` of a swing).
 `fit_phase` compares a state with the cycle at a grid of phases. It never looks at `RobotState.phase`, and the answer
-does not depend on where the robot is or which way it faces.
+does not depend on where the robot is or which way it faces. A robot that stands on all feet at rest has no phase: where
+a gait has such moments (a trot or walk on the spot) the answer there may be half a cycle off.
 """
 
 from dataclasses import dataclass
@@ -71,8 +72,8 @@ class PhaseFit:
 
     Attributes:
         phase: of the gait clock [cycles], in [0, 1).
-        error: root mean square of the scaled residuals there; about 1 in good walking, much more if the robot does
-            something else.
+        error: root mean square of the scaled residuals there: 0.1 to 0.6 in steady walking (1.5 far beyond the
+            command range), 1 to 2 when pushed about, more if the robot does something else.
     """
 
     phase: float
