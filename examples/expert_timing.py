@@ -12,14 +12,15 @@ from expert_lab import Lab
 from expert_limits import CRUISE, PushConfig, largest_push
 
 from experts import NMPCConfig, NMPCExpert
-from experts.whole_body import WHOLE_BODY
+from experts.nmpc import WHOLE_BODY
 from go1_mtl_gym.actuation import PHYSICS_HZ
 from go1_mtl_gym.state import RobotState
 
 MODES = {
     "default": NMPCConfig(),
-    "real-time iterations": NMPCConfig(linearisation="shifted"),
-    "up to 5 SQP iterations": NMPCConfig(sqp_iterations=5),
+    "one QP per call": NMPCConfig(sqp_iterations=1),
+    "real-time iterations": NMPCConfig(sqp_iterations=1, linearisation="shifted"),
+    "converged SQP": NMPCConfig(sqp_iterations=20, sqp_tolerance=1e-3),
 } | {f"whole body: {name}": NMPCConfig(whole_body=name) for name in WHOLE_BODY if name != NMPCConfig().whole_body}
 """Settings of the expert that are compared with each other, by name."""
 MODE_TASKS = ("trot", "bound", "jump")

@@ -23,11 +23,11 @@ class FootholdRule:
         InvalidInputError: if a figure is outside its range.
     """
 
-    velocity_gain: float = 0.10
-    reach: float = 0.28
+    velocity_gain: float = 0.03
+    reach: float = 0.34
 
     def __post_init__(self) -> None:
-        number_in(self.velocity_gain, 0.0, 1.0, "velocity_gain [s]")
+        number_in(self.velocity_gain, -0.1, 1.0, "velocity_gain [s]")
         number_in(self.reach, 0.02, 0.4, "reach [m]")
 
     def plan(

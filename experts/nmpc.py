@@ -6,16 +6,20 @@ One call runs once through the chain
           -> whole-body torques -> joint targets of the PD actuators.
 
 What is nonlinear in it. The model of `experts.dynamics` is: attitude kinematics, lever arms, gyroscopic moments, an
-inertia that is computed anew from the configuration at every call. By default each call linearises it along the
-reference and solves one QP: linear time-varying MPC, whose answer depends on the state alone. Two options go further.
-``sqp_iterations=n`` linearises again along the QP's own solution, up to n times or until the forces settle: the
-nonlinear program solved by sequential quadratic programming, still without memory. ``linearisation="shifted"`` begins
-at the last call's solution instead, moved on by the time that has passed: a real-time iteration (M. Diehl et al., 2005),
-one QP per call that converges from call to call, at the price of a memory.
+inertia that is computed anew from the configuration at every call. Each call linearises it along the reference and
+solves a QP, as convex MPC does. If the solution stays within `sqp_tolerance` of the trajectory that it was linearised
+along, as it does in steady walking, that is all; if not, as after a push, the model is linearised again along the
+solution, up to `sqp_iterations` QPs: sequential quadratic programming on the nonlinear program, cut short by default
+and converged with a small tolerance and many iterations. Either way the answer depends on the state alone.
+``linearisation="shifted"`` begins at the last call's solution instead, moved on by the time that has passed: with
+``sqp_iterations=1`` a real-time iteration (M. Diehl et al., 2005), which converges from call to call and remembers.
 
 The actuators hold a joint target for a whole control period, during which the joints move on. The target is therefore
 the one whose torque is right in the middle of the period, at q + v h/2 + vdot h^2/8 and v + vdot h/2 for a period h; as
 h goes to zero this becomes a = q + (tau + kd v)/kp.
+
+What the MPC turns and the reference tilts is the whole robot, trunk and legs (`Dynamics.lean_w`): four legs weigh more
+than the trunk, and a jump that swings them all forward turns the trunk back.
 
 By default nothing is remembered from call to call but counters, so the action is a function of the `RobotState`.
 """
@@ -27,6 +31,7 @@ import numpy as np
 
 from experts.dynamics import COM, FORCE_UNIT, RPY, linearise
 from experts.footholds import FootholdRule
+from experts.jacobian_transpose import jacobian_transpose_torques
 from experts.model import Dynamics, RobotModel
 from experts.mpc import LARGEST, MPC, MPCConfig, Solution
 from experts.nominal import NominalMotion, nominal_motion, standing_motion
@@ -34,12 +39,19 @@ from experts.planar import to_complex, turn
 from experts.reference import body_reference
 from experts.swing import SwingRule
 from experts.trajectory import Recall, Trajectory
-from experts.whole_body import WHOLE_BODY
+from experts.whole_body import joint_torques
+from experts.whole_body_qp import WholeBodyQP
 from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PDGains
 from go1_mtl_gym.state import RobotState
 from go1_mtl_gym.validation import number_in, one_of
 
+WHOLE_BODY = {
+    "closed_form": lambda: joint_torques,
+    "qp": lambda: WholeBodyQP().torques,
+    "jacobian_transpose": lambda: jacobian_transpose_torques,
+}
+"""Ways from forces to torques by name; the first is the default, since it did best (docs/results)."""
 SHORTEST_PIECE_S = 1e-3
 """Contact changes closer than this to each other or to the ends of a hold are taken as one [s]."""
 
@@ -54,7 +66,7 @@ class NMPCConfig:
         sqp_iterations: most QPs per call.
         sqp_tolerance: a QP whose solution is as near as this to the trajectory that it was linearised along is the
             last: attitude [rad], and position in units of `com_height`.
-        whole_body: how forces become torques: a name from `experts.whole_body.WHOLE_BODY`.
+        whole_body: how forces become torques: a name from `WHOLE_BODY`.
         mpc_hz: rate at which forces are planned anew [Hz], the whole body being solved at every call; None plans at
             every call. With a rate the expert remembers its plan.
         mpc: weights, limits and solver settings.
@@ -68,7 +80,7 @@ class NMPCConfig:
     com_height: float = 0.28
     linearisation: str = "reference"
     sqp_iterations: int = 3
-    sqp_tolerance: float = 0.1
+    sqp_tolerance: float = 0.2
     whole_body: str = "closed_form"
     mpc_hz: float | None = None
     mpc: MPCConfig = field(default_factory=MPCConfig)

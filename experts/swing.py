@@ -29,8 +29,8 @@ class SwingRule:
 
     stiffness: float = 400.0
     damping: float = 40.0
-    press: float = 0.003
-    early: float = 0.05
+    press: float = 0.006
+    early: float = 0.15
 
     def acceleration(
         self, state: RobotState, ahead_s: float, dynamics: Dynamics, velocity_w: np.ndarray, footholds: FootholdRule

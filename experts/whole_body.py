@@ -43,6 +43,3 @@ def joint_torques(
     torque = (dynamics.mass_matrix @ acceleration + dynamics.bias - generalised)[6:]
     return np.clip(torque, -robot.TORQUE_LIMIT, robot.TORQUE_LIMIT), acceleration[6:]
 
-
-WHOLE_BODY = {"closed_form": lambda: joint_torques}
-
