@@ -58,8 +58,8 @@ class SwingRule:
         arm = to_complex(landing - dynamics.com_w)
         stride = (to_complex(velocity_w) + carried(arm, state.command[2])) * gait.period
 
-        left, rate, curvature = _cubic(s)
-        height, climb, bend = _hump(s)
+        left, rate, curvature = cubic(s)
+        height, climb, bend = hump(s)
         time = gait.swing_s * (1.0 - self.early)
         position, velocity, forward = landing, np.empty((4, 3)), np.empty((4, 3))
         for axis, along in ((0, stride.real), (1, stride.imag)):
@@ -80,11 +80,11 @@ class SwingRule:
         return wanted / (1.0 + self.damping * ahead_s + self.stiffness * ahead_s**2 / 2)
 
 
-def _cubic(s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def cubic(s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """1 - (3 s^2 - 2 s^3) and its first and second derivatives."""
     return 1 - s * s * (3 - 2 * s), -6 * s * (1 - s), -6 * (1 - 2 * s)
 
 
-def _hump(s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def hump(s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """16 s^2 (1 - s)^2 and its first and second derivatives."""
     return 16 * s**2 * (1 - s) ** 2, 32 * s * (1 - s) * (1 - 2 * s), 32 * (1 - 6 * s + 6 * s**2)
