@@ -73,6 +73,7 @@ class RobotModel:
         self._feet = [self.model.getFrameId(f"{leg}_foot", pin.FrameType.OP_FRAME) for leg in robot.LEGS]
         self._damping = np.asarray(self.model.damping)
         self._no_acceleration = np.zeros(self.model.nv)
+        self._upper = np.triu_indices(self.model.nv, 1)
 
     def standing_inertia(self) -> np.ndarray:
         """Composite inertia about the centre of mass in the home pose, trunk axes [kg m^2], shape (3, 3)."""
@@ -85,7 +86,6 @@ class RobotModel:
         model, data = self.model, self.data
         q, v = to_pinocchio(state)
         pin.computeAllTerms(model, data, q, v)
-        pin.ccrba(model, data, q, v)
         pin.forwardKinematics(model, data, q, v, self._no_acceleration)
         pin.updateFramePlacements(model, data)
         jacobian = np.empty((12, model.nv))
@@ -95,13 +95,14 @@ class RobotModel:
             jacobian[3 * leg : 3 * leg + 3] = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)[:3]
             drift[leg] = pin.getFrameClassicalAcceleration(model, data, frame, pin.LOCAL_WORLD_ALIGNED).linear
             feet_w[leg] = data.oMf[frame].translation
-        upper = np.triu(data.M)
+        mass_matrix = data.M.copy()
+        mass_matrix.T[self._upper] = mass_matrix[self._upper]
         inertia = data.Ig.inertia.copy()
         turning = np.column_stack([data.hg.angular, data.Ag[3:, 6:] @ (state.q - robot.HOME_POSE)])
         mean_omega, lean = np.linalg.solve(inertia, turning).T
         return Dynamics(
             v=v,
-            mass_matrix=upper + np.triu(upper, 1).T,
+            mass_matrix=mass_matrix,
             bias=data.nle + self._damping * v,
             jacobian=jacobian,
             drift=drift,

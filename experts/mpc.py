@@ -6,8 +6,7 @@ Variables are the states x[1..N] and the inputs u[0..N-1] of `experts.dynamics`:
     subject to  x[k+1] = A[k] x[k] + B[k] u[k] + c[k]
                 |f_x| <= mu f_z,  |f_y| <= mu f_z,  f_min [s[k] = 1] <= f_z <= f_max s[k]      for each foot,
 
-with s[k] the share of interval k that the foot spends on the ground. Feet in the air get no force; their columns of
-B[k] are zero besides, which changes nothing at the optimum and spares a first-order solver a slow stretch.
+with s[k] the share of interval k that the foot spends on the ground, so that feet in the air get no force.
 """
 
 from dataclasses import dataclass, field
@@ -53,8 +52,8 @@ class MPCConfig:
     min_force: float = 10.0
     solver: str = "osqp"
     tolerance: float = 6e-4
-    rho: float = 2.0
-    relaxation: float = 1.35
+    rho: float = 1.4
+    relaxation: float = 1.3
     max_iterations: int = 300
 
     def __post_init__(self) -> None:
@@ -162,9 +161,8 @@ class QuadraticProgram:
             contact: shares of ground contact, shape (N, 4).
         """
         end = self.config.steps * NX
-        on_ground = (contact > 0).repeat(3, axis=1)[:, None]
         self.A.data[self._to_a] = -model.A[1:].ravel().take(self._from_a)
-        self.A.data[self._to_b] = -(model.B * on_ground).ravel().take(self._from_b)
+        self.A.data[self._to_b] = -model.B.ravel().take(self._from_b)
         self.q[:end], self.q[end:] = x_ref.ravel(), u_ref.ravel()
         self.q *= -self.weight
         offset = model.c.ravel().copy()

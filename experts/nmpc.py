@@ -172,10 +172,11 @@ class NMPCExpert:
         if state.standing:
             return self._whole_body(dynamics, forces, np.ones(4, bool), np.zeros((4, 3)))
         velocity_w = self.mean_velocity(state, dynamics)
+        ahead_s = swing_middle(state, self.hold_s)
+        swing = self.config.swing.acceleration(state, ahead_s, dynamics, velocity_w, self.config.footholds)
         torque, acceleration = np.zeros(12), np.zeros(12)
         for middle_s, share in contact_pieces(state, self.hold_s):
             stance = state.gait.stance(state.phase + middle_s / state.gait.period)
-            swing = self.config.swing.acceleration(state, middle_s, dynamics, velocity_w, self.config.footholds)
             part = self._whole_body(dynamics, forces, stance, swing)
             torque += share * part[0]
             acceleration += share * part[1]
@@ -244,6 +245,14 @@ def whole_body_attitude(state: RobotState, dynamics: Dynamics) -> np.ndarray:
     """Roll, pitch, yaw [rad] of trunk and legs together, for small angles between the two, shape (3,)."""
     lean = to_complex(dynamics.lean_w) * turn(-state.rpy[2])
     return state.rpy + np.array([lean.real, lean.imag, dynamics.lean_w[2]])
+
+
+def swing_middle(state: RobotState, hold_s: float) -> np.ndarray:
+    """Time until the middle of what a hold contains of each leg's swing [s], shape (4,); its end if it has none."""
+    gait = state.gait
+    leg = gait.leg_phase(state.phase)
+    lift_off, touchdown = (gait.duty - leg) * gait.period, (1.0 - leg) * gait.period
+    return (np.clip(lift_off, 0.0, hold_s) + np.minimum(touchdown, hold_s)) / 2
 
 
 def contact_pieces(state: RobotState, hold_s: float) -> list[tuple[float, float]]:

@@ -4,6 +4,7 @@ Each is set up once for a program's pattern, solves what the program holds at th
 every time, never from its previous answer: equal problems give equal bits whatever was solved before.
 """
 
+from collections import OrderedDict
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
 
 INEXACT = 1e-2
 """Largest residual of OSQP's scaled problem with which an unfinished solution is still used."""
+MOST_WORKSPACES = 512
+"""Workspaces that are kept, of some 0.3 MB each; the one that was not used for longest goes first."""
 _ROW_SCALE = 1.4  # friction rows against the inputs' own scale; found by measurement, as were rho and relaxation
 
 
@@ -39,10 +42,9 @@ class OSQPSolver:
     """ADMM, scaled by hand: z = D z', rows times E, so that the Hessian is the identity.
 
     D = P^(-1/2) and, on the dynamics' rows, E = Q^(1/2) keep the ones on the diagonal there. OSQP's own scaling would
-    have to be found anew for each problem; this one is right for all. With a relaxation of 1.35 instead of the usual 1.6
-    the equality constraints settle in half the iterations. The bounds of feet in the air, 0 <= f_z <= 0, are opened: their
-    forces do not enter the dynamics, so they are zero at the optimum anyhow, and a row that turns from inequality to
-    equality costs a second factorisation.
+    have to be found anew for each problem; this one is right for all. With a relaxation of 1.3 instead of the usual
+    1.6 the equality constraints settle in half the iterations. Forces of feet in the air are left out: there is one
+    workspace, a third smaller, for each pattern of contacts met. A gait has some dozens.
 
     Args:
         program: sizes, pattern and settings.
@@ -50,22 +52,63 @@ class OSQPSolver:
 
     def __init__(self, program: "QuadraticProgram") -> None:
         config, A = program.config, program.A
-        dynamics = config.steps * 12
+        self._split = config.steps * 12
         self._columns = program.weight**-0.5
         self._rows = np.full(A.shape[0], _ROW_SCALE * config.input_weight**0.5)
-        self._rows[:dynamics] = program.weight[:dynamics] ** 0.5
+        self._rows[: self._split] = program.weight[: self._split] ** 0.5
         column_of = np.repeat(np.arange(A.shape[1]), np.diff(A.indptr))
         self._entries = self._rows[A.indices] * self._columns[column_of]
-        self._multipliers = np.zeros(A.shape[0])
-        self._split, self._load = dynamics, slice(dynamics + 4, None, 5)
-        scaled = sparse.csc_matrix((A.data * self._entries, A.indices, A.indptr), A.shape)
+        self._workspaces: OrderedDict[bytes, _Workspace] = OrderedDict()
+
+    def solve(self, program: "QuadraticProgram", guess: np.ndarray) -> Answer:
+        """Solve what the program holds now, from `guess` and zero multipliers."""
+        used = program.u[self._split + 4 :: 5] > 0
+        key = used.tobytes()
+        workspace = self._workspaces.get(key)
+        if workspace is None:
+            workspace = self._workspaces[key] = _Workspace(program, used, self._rows, self._columns, self._entries)
+            if len(self._workspaces) > MOST_WORKSPACES:
+                self._workspaces.popitem(last=False)
+        self._workspaces.move_to_end(key)
+        return workspace.solve(program, guess)
+
+
+class _Workspace:
+    """OSQP for one pattern of contacts.
+
+    Args:
+        program: as of `OSQPSolver`.
+        used: foot and interval pairs with contact, bool, shape (4 N,).
+        rows, columns, entries: scales of A's rows, of its columns, and of its entries.
+    """
+
+    def __init__(
+        self,
+        program: "QuadraticProgram",
+        used: np.ndarray,
+        rows: np.ndarray,
+        columns: np.ndarray,
+        entries: np.ndarray,
+    ) -> None:
+        config, split = program.config, program.config.steps * 12
+        self._own_rows = np.concatenate([np.arange(split), split + np.flatnonzero(used.repeat(5))])
+        self._own_columns = np.concatenate([np.arange(split), split + np.flatnonzero(used.repeat(3))])
+        numbered = program.A.copy()
+        numbered.data = np.arange(1.0, numbered.nnz + 1)
+        numbered = sparse.csc_matrix(numbered[self._own_rows][:, self._own_columns])
+        numbered.sort_indices()
+        self._own_entries = numbered.data.astype(int) - 1
+        self._rows, self._columns = rows[self._own_rows], columns[self._own_columns]
+        self._entries = entries[self._own_entries]
+        self._multipliers = np.zeros(len(self._rows))
+        data = np.where(program.A.data == 0.0, 1.0, program.A.data)[self._own_entries] * self._entries
         self._solver = osqp.OSQP()
         self._solver.setup(
-            sparse.eye(A.shape[1], format="csc"),
-            program.q * self._columns,
-            scaled,
-            program.l * self._rows,
-            program.u * self._rows,
+            sparse.eye(len(self._columns), format="csc"),
+            np.zeros(len(self._columns)),
+            sparse.csc_matrix((data, numbered.indices, numbered.indptr), numbered.shape),
+            program.l[self._own_rows] * self._rows,
+            program.u[self._own_rows] * self._rows,
             verbose=False,
             scaling=0,
             adaptive_rho=0,
@@ -80,20 +123,22 @@ class OSQPSolver:
         )
 
     def solve(self, program: "QuadraticProgram", guess: np.ndarray) -> Answer:
-        """Solve what the program holds now, from `guess` and zero multipliers."""
+        """Solve what the program holds now; forces that are left out are zero."""
         rows, columns = self._rows, self._columns
-        upper = program.u * rows
-        load = upper[self._load]
-        load[load == 0.0] = np.inf
-        self._solver.update(q=program.q * columns, l=program.l * rows, u=upper, Ax=program.A.data * self._entries)
-        self._solver.warm_start(x=guess / columns, y=self._multipliers)
+        self._solver.update(
+            q=program.q[self._own_columns] * columns,
+            l=program.l[self._own_rows] * rows,
+            u=program.u[self._own_rows] * rows,
+            Ax=program.A.data[self._own_entries] * self._entries,
+        )
+        self._solver.warm_start(x=guess[self._own_columns] / columns, y=self._multipliers)
         result = self._solver.solve(raise_error=False)
         info = result.info
         finite = bool(np.isfinite(result.x).all())
         solved = finite and info.status_val == osqp.SolverStatus.OSQP_SOLVED
         close = finite and max(info.prim_res, info.dual_res) < INEXACT
-        z = result.x * columns
-        z[self._split :].reshape(-1, 3)[load == np.inf] = 0.0
+        z = np.zeros(len(guess))
+        z[self._own_columns] = result.x * columns
         return Answer(z, int(info.iter), solved, solved or close)
 
 

@@ -33,7 +33,7 @@ class SwingRule:
     early: float = 0.15
 
     def acceleration(
-        self, state: RobotState, ahead_s: float, dynamics: Dynamics, velocity_w: np.ndarray, footholds: FootholdRule
+        self, state: RobotState, ahead_s: np.ndarray, dynamics: Dynamics, velocity_w: np.ndarray, footholds: FootholdRule
     ) -> np.ndarray:
         """Accelerations of all feet as if they were in swing, for a moment that is a little ahead.
 
@@ -42,7 +42,7 @@ class SwingRule:
 
         Args:
             state: the robot now.
-            ahead_s: h, half of the time for which the answer is held [s].
+            ahead_s: h, time until the middle of what the answer is held for [s], shape (4,).
             dynamics: at the state.
             velocity_w: horizontal velocity of the body, as in `FootholdRule.plan` [m/s], shape (2,).
             footholds: where the feet are to land.
@@ -51,33 +51,36 @@ class SwingRule:
             World [m/s^2], shape (4, 3).
         """
         gait = state.gait
-        progress = gait.swing_progress(state.phase + ahead_s / gait.period)
+        leg = (gait.leg_phase(state.phase) + ahead_s / gait.period) % 1.0
+        progress = np.maximum(leg - gait.duty, 0.0) / (1.0 - gait.duty)
         s = np.minimum(progress / (1.0 - self.early), 1.0)
+        time = gait.swing_s * (1.0 - self.early)
         remaining = (1.0 - progress) * gait.swing_s + ahead_s
-        landing = footholds.plan(state, dynamics.com_w, velocity_w, remaining)
-        arm = to_complex(landing - dynamics.com_w)
+        landing = to_complex(footholds.plan(state, dynamics.com_w, velocity_w, remaining))
+        arm = landing - to_complex(dynamics.com_w)
         stride = (to_complex(velocity_w) + carried(arm, state.command[2])) * gait.period
 
         left, rate, curvature = cubic(s)
         height, climb, bend = hump(s)
-        time = gait.swing_s * (1.0 - self.early)
-        position, velocity, forward = landing, np.empty((4, 3)), np.empty((4, 3))
-        for axis, along in ((0, stride.real), (1, stride.imag)):
-            position[:, axis] -= left * along
-            velocity[:, axis] = -rate * along / time
-            forward[:, axis] = -curvature * along / time**2
-        position[:, 2] = robot.FOOT_RADIUS + gait.swing_height * height - self.press * s**2
-        velocity[:, 2] = (gait.swing_height * climb - 2 * self.press * s) / time
-        forward[:, 2] = (gait.swing_height * bend - 2 * self.press) / time**2
+        position = _spatial(landing - left * stride, gait.swing_height * height - self.press * s * s)
+        velocity = _spatial(rate * stride / -time, (gait.swing_height * climb - 2 * self.press * s) / time)
+        forward = _spatial(curvature * stride / -(time**2), (gait.swing_height * bend - 2 * self.press) / time**2)
+        position[:, 2] += robot.FOOT_RADIUS
         down = progress >= 1.0 - self.early
         velocity[down, 2], forward[down] = 0.0, 0.0
         foot, foot_velocity = dynamics.feet_w, dynamics.feet_velocity_w
+        h = ahead_s[:, None]
         wanted = (
             forward
-            + self.stiffness * (position - foot - foot_velocity * ahead_s)
+            + self.stiffness * (position - foot - foot_velocity * h)
             + self.damping * (velocity - foot_velocity)
         )
-        return wanted / (1.0 + self.damping * ahead_s + self.stiffness * ahead_s**2 / 2)
+        return wanted / (1.0 + self.damping * h + self.stiffness * h**2 / 2)
+
+
+def _spatial(planar: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """(x, y, z) of complex x + iy and z, shape (4, 3)."""
+    return np.stack([planar.real, planar.imag, z], axis=1)
 
 
 def cubic(s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
