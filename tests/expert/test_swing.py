@@ -16,9 +16,9 @@ VELOCITY = np.array([0.5, -0.1])
 PRESS, EARLY = 0.003, 0.1
 
 
-def ahead(h: float) -> float:
-    """The law's look-ahead argument."""
-    return h
+def ahead(h: float) -> np.ndarray:
+    """The same look-ahead for every leg."""
+    return np.full(4, h)
 
 
 @pytest.mark.parametrize("curve", [cubic, hump])
