@@ -33,7 +33,12 @@ class SwingRule:
     early: float = 0.15
 
     def acceleration(
-        self, state: RobotState, ahead_s: np.ndarray, dynamics: Dynamics, velocity_w: np.ndarray, footholds: FootholdRule
+        self,
+        state: RobotState,
+        ahead_s: np.ndarray,
+        dynamics: Dynamics,
+        velocity_w: np.ndarray,
+        footholds: FootholdRule,
     ) -> np.ndarray:
         """Accelerations of all feet as if they were in swing, for a moment that is a little ahead.
 

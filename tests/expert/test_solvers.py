@@ -58,8 +58,8 @@ def violation(program: QuadraticProgram, z: np.ndarray) -> np.ndarray:
 def stationarity(program: QuadraticProgram, z: np.ndarray, contact: np.ndarray) -> np.ndarray:
     """What multipliers cannot make zero of the cost's gradient, per foot and interval with contact, shape (M,).
 
-    Those of the dynamics are the costates, for which the gradient with respect to every state vanishes exactly. Those of
-    a foot's force are then the non-negative ones of its active limits, if it has any, that come closest.
+    Those of the dynamics are the costates, for which the gradient with respect to every state vanishes exactly. Those
+    of a foot's force are then the non-negative ones of its active limits, if it has any, that come closest.
     """
     gradient, A = program.P @ z + program.q, program.A.tocsc()
     states, limits = A[:DYNAMICS], A[DYNAMICS:, DYNAMICS:]

@@ -116,9 +116,8 @@ def test_a_turning_body_swings_its_feet_along_a_circle(standing, model):
     state, dynamics = moving(standing, model, gait, 0.0, gait.duty + s * (1 - gait.duty))
     state, still = replace(state, command=np.array([0.0, 0.0, 1.0])), np.zeros(2)
     on_ground = replace(dynamics, feet_w=np.zeros((4, 3)), feet_velocity_w=np.zeros((4, 3)))
-    both = [
-        SwingRule(k, 0.0, PRESS, EARLY).acceleration(state, ahead(0.0), on_ground, still, FootholdRule()) for k in (0, 1)
-    ]
+    rules = (SwingRule(k, 0.0, PRESS, EARLY) for k in (0.0, 1.0))
+    both = [rule.acceleration(state, ahead(0.0), on_ground, still, FootholdRule()) for rule in rules]
     landing = FootholdRule().plan(state, dynamics.com_w, still, np.full(4, (1 - s) * gait.swing_s))[0]
     arm = landing - dynamics.com_w
     stride = landing - (both[1] - both[0])[0]
