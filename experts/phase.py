@@ -2,18 +2,21 @@
 
 A gait's nominal cycle says what everything should look like at each phase. With lambda the phase of a leg in its own
 cycle, T the period, beta the duty, w = (1 - early)(1 - beta) the share of the cycle in which the foot is under way, v
-the velocity of the body at the leg (heading frame) and x the foot's place relative to the point under its hip,
+the mean velocity of the body at the leg (heading frame; measured, less the nominal sway at the phase in question) and x
+the foot's place relative to the point under its hip,
 
-    (1)  x = v T (beta/2 - k(lambda)),    xdot_world = v (1 - k'(lambda)),
+    (1)  x = v T (beta/2 - k(lambda)) - d,    xdot_world = v (1 - k'(lambda)),
          k = lambda                  in stance: the body passes over the foot, half a stride before it to half behind,
-         k = left(s) - (1 - lambda)  in swing, s = min((lambda - beta)/w, 1), left = 1 - 10 s^3 + 15 s^4 - 6 s^5,
-    (2)  z = radius + h 16 s^2 (1 - s)^2 - press s^2,
+         k = left(s) - (1 - lambda)  in swing, s = min((lambda - beta)/w, 1), left = 1 - 3 s^2 + 2 s^3,
+         d = the body's sway since the touchdown in stance, 0 in swing,
+    (2)  z = radius + max(h 16 s^2 (1 - s)^2 - press s^2, 0),
 
-as `experts.footholds` and `experts.swing` plan it; the body's vertical velocity and its roll and pitch rates are those
-of `experts.nominal`, and a foot touches the ground in stance and while it waits for it (the share `early` of a swing).
-`fit_phase` compares a state with the cycle at a grid of phases. It never looks at `RobotState.phase`, and the answer
-does not depend on where the robot is or which way it faces. A robot that stands on all feet at rest has no phase: where
-a gait has such moments (a trot or walk on the spot) the answer there may be half a cycle off.
+as `experts.footholds` and `experts.swing` plan it. Height, sway, attitude and angular velocity of the whole robot are
+those of `experts.nominal` about the commanded motion, and a foot touches the ground in stance and in the swing's end,
+where its arc is below the ground. `fit_phase` compares a state with the cycle at a grid of phases. It never looks at
+`RobotState.phase`, and the answer does not depend on where the robot is or which way it faces. A robot that stands on
+all feet at rest has no phase: where a gait has such moments (a trot or walk on the spot) the answer there may be half a
+cycle off.
 """
 
 from dataclasses import dataclass
@@ -22,15 +25,16 @@ from functools import lru_cache
 import numpy as np
 
 from experts.model import RobotModel
+from experts.nmpc import NMPCConfig, whole_body_attitude
 from experts.nominal import SAMPLES, nominal_motion
-from experts.planar import carried, turned
-from experts.swing import SwingRule
+from experts.planar import carried, to_complex, turn
+from experts.swing import SwingRule, cubic, hump
 from go1_mtl_gym import robot
 from go1_mtl_gym.gaits import Gait
 from go1_mtl_gym.state import RobotState
 
-COM_HEIGHT = 0.27
-"""Mean height of the centre of mass in good walking [m]."""
+LAG_S, TRAIL_S = 0.005, 0.02
+"""By how much feet follow their plan late [s], and what they tread behind it, per speed of the body [m per m/s]."""
 _BLUR = 0.03  # half the width of the ramps between "in the air" and "on the ground" [cycles]
 
 
@@ -46,24 +50,21 @@ class PhaseScales:
         speed: horizontal velocity of a foot [m/s].
         level: height of the centre of mass [m].
         heave: its vertical velocity [m/s].
-        tilt: roll and pitch [rad].
-        rate: their rates [rad/s].
+        sway: its horizontal velocity [m/s].
+        tilt: roll and pitch of the whole robot [rad].
+        rate: its angular velocity [rad/s].
     """
 
-    contact: float = 0.75
-    height: float = 0.01
-    climb: float = 0.2
-    place: float = 0.03
-    speed: float = 0.2
-    level: float = 0.03
-    heave: float = 0.1
-    tilt: float = 0.3
-    rate: float = 1.5
-
-    @property
-    def body(self) -> np.ndarray:
-        """Scales of the columns of the nominal body motion, shape (6,)."""
-        return np.array([self.level, self.tilt, self.tilt, self.heave, self.rate, self.rate])
+    contact: float = 0.5
+    height: float = 0.015
+    climb: float = 0.4
+    place: float = 0.016
+    speed: float = 0.22
+    level: float = 0.04
+    heave: float = 0.06
+    sway: float = 0.03
+    tilt: float = 0.03
+    rate: float = 0.5
 
 
 @dataclass(frozen=True)
@@ -72,8 +73,8 @@ class PhaseFit:
 
     Attributes:
         phase: of the gait clock [cycles], in [0, 1).
-        error: root mean square of the scaled residuals there: 0.1 to 0.6 in steady walking (1.5 far beyond the
-            command range), 1 to 2 when pushed about, more if the robot does something else.
+        error: root mean square of the scaled residuals there: 0.3 to 0.8 in a steady gait (a walk: 0.8 to 1.8), up to 2
+            when pushed about or if the robot does something else.
     """
 
     phase: float
@@ -82,7 +83,7 @@ class PhaseFit:
 
 @dataclass(frozen=True)
 class _Cycle:
-    """The nominal cycle at phases i / SAMPLES; each of shape (SAMPLES, 4) but for `body`.
+    """The nominal cycle at phases i / SAMPLES; of shape (SAMPLES, 4) unless said otherwise.
 
     Attributes:
         ground: share of contact.
@@ -90,7 +91,12 @@ class _Cycle:
         climb: [m/s].
         place: beta/2 - k of equation (1), times the period [s].
         speed: 1 - k' of equation (1).
-        body: deviation of the height [m], roll and pitch [rad], and their time derivatives, shape (SAMPLES, 6).
+        drawn: d of equation (1), heading frame, complex [m].
+        sway: velocity of the body, heading frame, complex [m/s], shape (SAMPLES,).
+        tilt: roll and pitch [rad], shape (SAMPLES, 2).
+        rate: angular velocity, heading frame [rad/s], shape (SAMPLES, 3).
+        level: deviation of the height [m], shape (SAMPLES,).
+        heave: its rate [m/s], shape (SAMPLES,).
     """
 
     ground: np.ndarray
@@ -98,7 +104,12 @@ class _Cycle:
     climb: np.ndarray
     place: np.ndarray
     speed: np.ndarray
-    body: np.ndarray
+    drawn: np.ndarray
+    sway: np.ndarray
+    tilt: np.ndarray
+    rate: np.ndarray
+    level: np.ndarray
+    heave: np.ndarray
 
 
 def fit_phase(
@@ -106,7 +117,7 @@ def fit_phase(
     model: RobotModel | None = None,
     scales: PhaseScales | None = None,
     swing: SwingRule | None = None,
-    com_height: float = COM_HEIGHT,
+    com_height: float = NMPCConfig.com_height,
 ) -> PhaseFit:
     """The phase of `state.gait` whose nominal motion fits a state best; `state.phase` is ignored.
 
@@ -120,67 +131,80 @@ def fit_phase(
         swing: the expert's; its `press` and `early` shape the cycle.
         com_height: mean height of the centre of mass [m].
     """
-    scales = scales or PhaseScales()
-    swing = swing or SwingRule()
-    model = model or _shared_model()
-    cycle = _cycle(state.gait, swing.early, swing.press, _standing_inertia())
-    cost, count = _cost(state, model, cycle, scales, com_height)
+    cycle = _cycle(state.gait, swing or SwingRule(), com_height)
+    residuals = _residuals(state, model or _shared_model(), cycle, scales or PhaseScales(), com_height)
+    cost = np.square(residuals).sum(axis=1)
     best = int(np.argmin(cost))
     before, here, after = cost[best - 1], cost[best], cost[(best + 1) % SAMPLES]
     bend = before + after - 2 * here
     shift = 0.5 * (before - after) / bend if bend > 0 else 0.0
     least = here - 0.25 * (before - after) * shift
-    return PhaseFit(float((best + shift) / SAMPLES % 1.0), float(np.sqrt(max(least, 0.0) / count)))
+    return PhaseFit(float((best + shift) / SAMPLES % 1.0), float(np.sqrt(max(least, 0.0) / residuals.shape[1])))
 
 
-def _cost(
+def _residuals(
     state: RobotState, model: RobotModel, cycle: _Cycle, scales: PhaseScales, com_height: float
-) -> tuple[np.ndarray, int]:
-    """Sum of squared scaled residuals at each phase of the grid, shape (SAMPLES,), and their number."""
+) -> np.ndarray:
+    """Scaled residuals at each phase of the grid, shape (SAMPLES, 37)."""
     dynamics = model.dynamics(state)
-    yaw = state.rpy[2]
-    arm = robot.NOMINAL_FOOT_B[:, :2]
-    place = turned(dynamics.feet_w[:, :2] - dynamics.com_w[:2], -yaw) - arm
-    speed = turned(dynamics.feet_velocity_w[:, :2], -yaw)
-    omega_w = state.rotation @ state.angular_velocity_b
-    level, heave = dynamics.com_w[2] - com_height, dynamics.com_velocity_w[2]
-    body = np.concatenate([[level], state.rpy[:2], [heave], turned(omega_w[:2], -yaw)])
-    velocity = turned(dynamics.com_velocity_w[:2], -yaw) + carried(arm, state.command[2])
+    vx, vy, yaw_rate = state.command.tolist()
+    back = turn(-state.rpy[2])  # from the world to the heading frame
+    arm = to_complex(state.gait.nominal_feet_b)
+    com_velocity = to_complex(dynamics.com_velocity_w) * back
+    mean = com_velocity - cycle.sway
+    velocity = mean[:, None] + carried(arm, yaw_rate)
+    place = to_complex(dynamics.feet_w - dynamics.com_w) * back - arm
+    speed = to_complex(dynamics.feet_velocity_w) * back
+    turning = to_complex(dynamics.mean_omega_w) * back
+    rate = np.array([turning.real, turning.imag, dynamics.mean_omega_w[2] - yaw_rate])
+    columns = (
+        (cycle.ground - state.contacts) / scales.contact,
+        (cycle.height - dynamics.feet_w[:, 2]) / scales.height,
+        (cycle.climb - dynamics.feet_velocity_w[:, 2]) / scales.climb,
+        _parts(cycle.place * velocity - cycle.drawn - place) / scales.place,
+        _parts(cycle.speed * velocity - speed) / scales.speed,
+        _parts(mean[:, None] - complex(vx, vy)) / scales.sway,
+        (cycle.tilt - whole_body_attitude(state, dynamics)[:2]) / scales.tilt,
+        (cycle.rate - rate) / scales.rate,
+        (cycle.level - (dynamics.com_w[2] - com_height))[:, None] / scales.level,
+        (cycle.heave - dynamics.com_velocity_w[2])[:, None] / scales.heave,
+    )
+    return np.hstack(columns)
 
-    per_foot = (
-        np.square((cycle.ground - state.contacts) / scales.contact)
-        + np.square((cycle.height - dynamics.feet_w[:, 2]) / scales.height)
-        + np.square((cycle.climb - dynamics.feet_velocity_w[:, 2]) / scales.climb)
-    )
-    planar = np.square((cycle.place[..., None] * velocity - place) / scales.place) + np.square(
-        (cycle.speed[..., None] * velocity - speed) / scales.speed
-    )
-    whole = np.square((cycle.body - body) / scales.body)
-    return per_foot.sum(axis=1) + planar.sum(axis=(1, 2)) + whole.sum(axis=1), 4 * 3 + 4 * 2 * 2 + 6
+
+def _parts(values: np.ndarray) -> np.ndarray:
+    """Real and imaginary parts side by side: (N, M) complex to (N, 2 M)."""
+    return np.hstack([values.real, values.imag])
 
 
 @lru_cache(maxsize=64)
-def _cycle(gait: Gait, early: float, press: float, inertia: tuple[float, float]) -> _Cycle:
+def _cycle(gait: Gait, swing: SwingRule, com_height: float) -> _Cycle:
     """The nominal cycle of a gait, equations (1) and (2)."""
     duty, period = gait.duty, gait.period
-    leg = gait.leg_phase(np.arange(SAMPLES) / SAMPLES)
+    phase = np.arange(SAMPLES) / SAMPLES
+    leg = gait.leg_phase(phase - LAG_S / period)
     stance = leg < duty
-    under_way = (1 - early) * (1 - duty)
+    under_way = (1 - swing.early) * (1 - duty)
     s = np.clip((leg - duty) / under_way, 0.0, 1.0)
-    moving = (s > 0) & (s < 1)
-    left = 1 - s**3 * (10 - 15 * s + 6 * s**2)
-    k = np.where(stance, leg, left - (1 - leg))
-    slope = -30 * s**2 * (1 - s) ** 2 / under_way
-    hump, rise = 16 * s**2 * (1 - s) ** 2, 32 * s * (1 - s) * (1 - 2 * s)
-    sink = np.where(moving, press * s, 0.0)  # on the ground a foot cannot sink
-    motion = nominal_motion(gait, *inertia)
+    left, slope, _ = cubic(s)
+    arc, rise, _ = hump(s)
+    arc, rise = gait.swing_height * arc - swing.press * s**2, gait.swing_height * rise - 2 * swing.press * s
+    above = arc > 0.0
+    landed = 1.0 - min(np.sqrt(swing.press / gait.swing_height) / 4, 1.0)  # s at which the arc meets the ground
+    motion = nominal_motion(gait, _standing_inertia(), com_height - robot.FOOT_RADIUS)
+    touchdown = motion.at((phase[:, None] - leg).ravel())[:, 3:5].reshape(SAMPLES, 4, 2)
     return _Cycle(
-        ground=_contact_share(leg, duty, early * (1 - duty)),
-        height=robot.FOOT_RADIUS + gait.swing_height * hump - sink * s,
-        climb=(gait.swing_height * rise - 2 * sink) / (under_way * period),
-        place=period * (duty / 2 - k),
-        speed=-slope,
-        body=np.hstack([motion.position[:, [2, 0, 1]], motion.velocity[:, [2, 0, 1]]]),
+        ground=_contact_share(leg, duty, 1 - duty - landed * under_way),
+        height=robot.FOOT_RADIUS + np.where(above, arc, 0.0),
+        climb=np.where(above, rise / (under_way * period), 0.0),
+        place=period * (duty / 2 - np.where(stance, leg, left - (1 - leg))) - TRAIL_S,
+        speed=-slope / under_way,
+        drawn=np.where(stance, to_complex(motion.position[:, None, 3:5]) - to_complex(touchdown), 0.0),
+        sway=to_complex(motion.velocity[:, 3:5]),
+        tilt=motion.position[:, :2],
+        rate=motion.velocity[:, :3],
+        level=motion.position[:, 5],
+        heave=motion.velocity[:, 5],
     )
 
 
@@ -199,6 +223,5 @@ def _shared_model() -> RobotModel:
 
 
 @lru_cache(maxsize=1)
-def _standing_inertia() -> tuple[float, float]:
-    inertia = _shared_model().standing_inertia()
-    return float(inertia[0, 0]), float(inertia[1, 1])
+def _standing_inertia() -> tuple[float, float, float]:
+    return tuple(np.diag(_shared_model().standing_inertia()).tolist())

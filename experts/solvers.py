@@ -5,6 +5,8 @@ every time, never from its previous answer: equal problems give equal bits whate
 """
 
 from collections import OrderedDict
+from importlib import import_module
+from types import ModuleType
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
@@ -146,21 +148,25 @@ class PIQPSolver:
     """Proximal interior point on the sparse program, to 1e-8 (R. Schwan et al., 2023)."""
 
     def __init__(self, program: "QuadraticProgram") -> None:
-        import piqp
-
+        piqp = _optional("piqp")
         self._done = piqp.PIQP_SOLVED
         self._split = program.config.steps * 12
         self._solver = piqp.SparseSolver()
-        self._solver.setup(sparse.csc_matrix(program.P), program.q, *self._constraints(program))
+        self._solver.settings.preconditioner_reuse_on_update = True  # equal bits: see `solve`
+        self._P = sparse.csc_matrix(program.P)
+        self._solver.setup(self._P, program.q, *self._constraints(program))
 
     def _constraints(self, program: "QuadraticProgram") -> tuple:
         at = self._split
         return program.A[:at], program.l[:at].copy(), program.A[at:], program.l[at:].copy(), program.u[at:].copy()
 
     def solve(self, program: "QuadraticProgram", guess: np.ndarray) -> Answer:
-        """Solve what the program holds now; an interior point method starts where it wants to."""
+        """Solve what the program holds now; an interior point method starts where it wants to.
+
+        P is given anew though it is constant: PIQP would scale its own copy back and forth, and gather rounding.
+        """
         A, b, G, h_l, h_u = self._constraints(program)
-        self._solver.update(c=program.q, A=A, b=b, G=G, h_l=h_l, h_u=h_u)
+        self._solver.update(P=self._P, c=program.q, A=A, b=b, G=G, h_l=h_l, h_u=h_u)
         solved = self._solver.solve() == self._done
         result = self._solver.result
         return Answer(np.array(result.x), int(result.info.iter), solved, solved and bool(np.isfinite(result.x).all()))
@@ -174,9 +180,7 @@ class DAQPSolver:
     """
 
     def __init__(self, program: "QuadraticProgram") -> None:
-        import daqp
-
-        self._daqp = daqp
+        self._daqp = _optional("daqp")
         self._split = program.config.steps * 12
 
     def solve(self, program: "QuadraticProgram", guess: np.ndarray) -> Answer:
@@ -199,6 +203,14 @@ class DAQPSolver:
         z[:at], z[at + used] = offset + S @ u, u
         solved = flag == 1 and bool(np.isfinite(z).all())
         return Answer(z, int(info["iterations"]), solved, solved)
+
+
+def _optional(name: str) -> ModuleType:
+    try:
+        return import_module(name)
+    except ImportError as error:
+        message = f"the MPC's solver {name!r} needs the package {name}: pip install 'go1-mtl-gym[solvers]'"
+        raise ImportError(message) from error
 
 
 SOLVERS = {"osqp": OSQPSolver, "piqp": PIQPSolver, "daqp": DAQPSolver}

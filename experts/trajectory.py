@@ -40,7 +40,7 @@ class Trajectory:
         low = np.clip(where.astype(int), 0, steps - 1)
         share = (where - low)[:, None]
         states = (1 - share) * self.states[low] + share * self.states[low + 1]
-        beyond = where > steps
+        beyond = where > steps + 1e-9
         states[beyond] = reference[beyond]
         middle = (where[:-1] + 0.5).astype(int)
         inputs = np.where((middle < steps)[:, None], self.inputs[np.minimum(middle, steps - 1)], nominal)

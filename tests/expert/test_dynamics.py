@@ -1,41 +1,45 @@
-"""The linear prediction model against finite differences of the nonlinear single rigid body."""
+"""The linear prediction model against finite differences of the nonlinear single rigid body, written anew here."""
 
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from scipy.spatial.transform import Rotation
 
-from experts.dynamics import FORCE_UNIT, cross_matrix, euler_rate_matrix, linearise
-from experts.reference import BodyReference
+from experts.dynamics import FORCE_UNIT, LinearModel, cross_matrix, euler_rate_matrix, linearise, rotation_matrix
 from go1_mtl_gym import robot
 
-INERTIA = np.array([[0.127, 0.001, -0.015], [0.001, 0.394, 0.002], [-0.015, 0.002, 0.423]])
-LOAD = np.array([55.0, 10.0, 20.0, 40.0])
+INERTIA_B = np.array([[0.127, 0.001, -0.015], [0.001, 0.394, 0.002], [-0.015, 0.002, 0.423]])
 FEET = robot.NOMINAL_FOOT_B + np.array([0.3, -0.2, 0.023])
+POINT = np.array([0.05, -0.1, 0.7, 0.31, -0.19, 0.28, 0.6, -1.0, 0.5, 0.4, 0.1, -0.05])
+INPUT = np.array([[4.0, -9.0, 55.0], [0, 3.0, 10.0], [-5.0, 0, 20.0], [2.0, 7.0, 40.0]]).ravel() / FORCE_UNIT
 
 
-def frozen(rpy=(0.05, -0.1, 0.7), com=(0.31, -0.19, 0.28), velocity=(0.4, 0.1, -0.05), omega=(0.0, 0.0, 0.0), steps=2):
-    """A reference that stays where it is, so that the middle of each interval is the same point."""
-    return BodyReference(*(np.tile(value, (steps + 1, 1)) for value in (rpy, com, omega, velocity)))
+def at_point(dt: float, x: np.ndarray = POINT, u: np.ndarray = INPUT) -> LinearModel:
+    """The model of an interval in which the trajectory rests at one point."""
+    return linearise(np.array([x, x]), u[None], FEET[None], INERTIA_B, dt)
 
 
 def rotation(rpy: np.ndarray) -> np.ndarray:
-    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
-    yaw, pitch = [[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]], [[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]]
-    return np.array(yaw) @ np.array(pitch) @ np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
+    return Rotation.from_euler("ZYX", rpy[::-1]).as_matrix()
+
+
+def euler_rates(rpy: np.ndarray, omega: np.ndarray) -> np.ndarray:
+    """The rates for which Rdot = [omega] R, from the three axes about which roll, pitch and yaw turn."""
+    yaw = rotation(np.array([0.0, 0.0, rpy[2]]))
+    pitch = rotation(np.array([0.0, rpy[1], rpy[2]]))
+    axes = np.column_stack([pitch[:, 0], yaw[:, 1], [0.0, 0.0, 1.0]])
+    return np.linalg.solve(axes, omega)
 
 
 def nonlinear(x: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Equations (1)-(4) of experts.dynamics; (1) with E inverted from rotation kinematics in the test below."""
+    """Newton and Euler; the inertia counts as given, so it is that of POINT's attitude."""
     force = u.reshape(4, 3) * FORCE_UNIT
+    inertia = rotation(POINT[:3]) @ INERTIA_B @ rotation(POINT[:3]).T
+    omega = x[6:9]
     moment = sum(np.cross(r - x[3:6], f) for r, f in zip(FEET, force))
-    return np.concatenate(
-        [
-            euler_rate_matrix(x[:3]) @ x[6:9],
-            x[9:12],
-            np.linalg.solve(INERTIA, moment),
-            force.sum(axis=0) / robot.MASS + [0, 0, -9.81],
-        ]
-    )
+    turning = np.linalg.solve(inertia, moment - np.cross(omega, inertia @ omega))
+    falling = force.sum(axis=0) / robot.MASS + [0, 0, -9.81]
+    return np.concatenate([euler_rates(x[:3], omega), x[9:12], turning, falling])
 
 
 def jacobian(function, at: np.ndarray, step: float = 1e-6) -> np.ndarray:
@@ -43,14 +47,9 @@ def jacobian(function, at: np.ndarray, step: float = 1e-6) -> np.ndarray:
     return np.stack(columns, axis=1)
 
 
-def nominal_input() -> np.ndarray:
-    u = np.zeros((4, 3))
-    u[:, 2] = LOAD / FORCE_UNIT
-    return u.ravel()
-
-
-def continuous(reference: BodyReference, dt: float = 1e-7):
-    model = linearise(reference, np.tile(FEET, (2, 1, 1)), np.tile(LOAD, (2, 1)), INERTIA, dt)
+def continuous() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    dt = 1e-7
+    model = at_point(dt)
     return (model.A[0] - np.eye(12)) / dt, model.B[0] / dt, model.c[0] / dt
 
 
@@ -58,6 +57,15 @@ def test_cross_matrix_is_the_cross_product():
     rng = np.random.default_rng(0)
     r, f = rng.normal(size=(5, 4, 3)), rng.normal(size=(5, 4, 3))
     np.testing.assert_allclose((cross_matrix(r) @ f[..., None])[..., 0], np.cross(r, f), atol=1e-14)
+
+
+def test_rotation_matrix_is_yaw_then_pitch_then_roll():
+    rpy = np.random.default_rng(2).uniform(-3, 3, (20, 3))
+    np.testing.assert_allclose(rotation_matrix(rpy), [rotation(angles) for angles in rpy], atol=1e-14)
+    quarter = rotation_matrix(np.array([[0.0, 0.0, np.pi / 2]]))[0]
+    np.testing.assert_allclose(quarter @ [1.0, 0, 0], [0, 1, 0], atol=1e-15)
+    nose_down = rotation_matrix(np.array([[0.0, 0.1, 0.0]]))[0]
+    assert nose_down[2, 0] < 0, "a positive pitch lowers the nose"
 
 
 def test_euler_rates_turn_the_body_at_omega():
@@ -74,29 +82,25 @@ def test_euler_rates_at_zero_attitude_are_omega():
     np.testing.assert_array_equal(euler_rate_matrix(np.zeros((3, 3))), np.tile(np.eye(3), (3, 1, 1)))
 
 
-def test_linear_model_is_the_jacobian_of_the_nonlinear_one():
-    reference = frozen()
-    x, u = reference.states[0], nominal_input()
-    A, B, _ = continuous(reference)
-    np.testing.assert_allclose(A, jacobian(lambda x: nonlinear(x, u), x), atol=1e-4)
-    np.testing.assert_allclose(B, jacobian(lambda u: nonlinear(x, u), u), atol=1e-4)
+def test_A_and_B_are_the_jacobians_of_the_nonlinear_model():
+    A, B, _ = continuous()
+    np.testing.assert_allclose(A, jacobian(lambda x: nonlinear(x, INPUT), POINT), atol=1e-4)
+    np.testing.assert_allclose(B, jacobian(lambda u: nonlinear(POINT, u), INPUT), atol=1e-4)
     assert np.abs(A[6:9, 3:6]).max() > 100, "the moment of the load about a displaced centre of mass matters"
+    assert np.abs(A[6:9, 6:9]).max() > 0.3, "so does the gyroscopic one"
+    assert np.abs(A[:3, :3]).max() > 0.3, "and the attitude in the rates of roll, pitch and yaw"
 
 
-@pytest.mark.parametrize("omega", [(0.0, 0.0, 0.0), (0.3, -1.0, 0.5)])
-def test_linear_model_is_exact_at_the_reference(omega):
-    reference = frozen(omega=omega)
-    A, B, c = continuous(reference)
-    x, u = reference.states[0], nominal_input()
-    np.testing.assert_allclose(A @ x + B @ u + c, nonlinear(x, u), atol=2e-4)
+def test_the_affine_model_agrees_with_the_nonlinear_one_at_the_point():
+    A, B, c = continuous()
+    np.testing.assert_allclose(A @ POINT + B @ INPUT + c, nonlinear(POINT, INPUT), atol=2e-4)
 
 
 def test_discretisation_is_of_second_order():
-    reference = frozen()
-    A, B, c = continuous(reference)
+    A, B, c = continuous()
     errors = []
     for dt in (0.04, 0.02, 0.01):
-        model = linearise(reference, np.tile(FEET, (2, 1, 1)), np.tile(LOAD, (2, 1)), INERTIA, dt)
+        model = at_point(dt)
         exact = expm(dt * np.block([[A, B, c[:, None]], [np.zeros((13, 25))]]))[:12]
         got = np.hstack([model.A[0], model.B[0], model.c[0][:, None]])
         errors.append(np.abs(got - exact).max())
@@ -104,32 +108,64 @@ def test_discretisation_is_of_second_order():
     assert np.array(errors[:-1]) / errors[1:] == pytest.approx(8.0, rel=0.2)  # the first term left out is dt^3
 
 
+def test_one_step_follows_the_nonlinear_motion():
+    """Integrated finely, with the inertia turning along: a hundredth of what changes during the step."""
+    dt, parts = 0.02, 200
+    x = POINT.copy()
+    for _ in range(parts):
+        k1 = nonlinear(x, INPUT)
+        x = x + dt / parts * nonlinear(x + dt / parts / 2 * k1, INPUT)
+    model = linearise(np.array([POINT, x]), INPUT[None], FEET[None], INERTIA_B, dt)
+    predicted = model.A[0] @ POINT + model.B[0] @ INPUT + model.c[0]
+    np.testing.assert_allclose(predicted - x, 0, atol=0.02 * np.abs(x - POINT).max())
+    assert np.abs(x - POINT).max() > 0.1
+
+
 def test_free_fall_by_hand():
-    model = linearise(frozen(), np.tile(FEET, (2, 1, 1)), np.tile(LOAD, (2, 1)), INERTIA, 0.1)
-    x = np.zeros(12)
-    x[3:6] = frozen().com_w[0]  # at the reference position, so that the load has no moment
-    x[9:12] = [1.0, 0.0, 2.0]
+    model = at_point(0.1, u=np.zeros(12))
+    x = POINT.copy()
+    x[6:9], x[9:12] = 0.0, [1.0, 0.0, 2.0]
     after = model.A[0] @ x + model.c[0]
     np.testing.assert_allclose(after[3:6] - x[3:6], [0.1, 0.0, 0.2 - 9.81 * 0.005], atol=1e-12)
     np.testing.assert_allclose(after[9:12], [1.0, 0.0, 2.0 - 0.981], atol=1e-12)
 
 
 def test_two_units_of_force_carry_the_robot():
-    model = linearise(frozen(), np.tile(FEET, (2, 1, 1)), np.tile(LOAD, (2, 1)), INERTIA, 0.02)
     u = np.zeros((4, 3))
     u[[0, 3], 2] = 1.0
-    velocity = model.B[0] @ u.ravel() + model.c[0]
+    model = at_point(0.02)
     np.testing.assert_allclose(FORCE_UNIT, 12.743448 * 9.81 / 2)
-    np.testing.assert_allclose(velocity[9:12], 0, atol=1e-12)
+    np.testing.assert_allclose((model.B[0] @ u.ravel() + model.c[0])[9:12], 0, atol=1e-12)
 
 
-def test_middle_of_the_interval_and_yaw_of_the_inertia_follow_the_reference():
-    turned = frozen(steps=1)
-    turned.rpy[1, 2] = turned.rpy[0, 2] + np.pi  # the middle is a quarter turn on
-    feet, load = FEET[None], LOAD[None]
-    quarter = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]])
-    straight = frozen(steps=1, rpy=(*turned.rpy[0, :2], turned.rpy[0, 2] + np.pi / 2))
-    a = linearise(turned, feet, load, INERTIA, 0.02)
-    b = linearise(straight, feet, load, quarter @ INERTIA @ quarter.T, 0.02)
-    np.testing.assert_allclose(a.B, b.B, atol=1e-12)
-    np.testing.assert_allclose(a.A, b.A, atol=1e-12)
+def test_a_foot_ahead_that_pushes_up_lifts_the_nose_by_hand():
+    x = np.zeros(12)
+    x[5] = 0.28
+    feet = np.zeros((1, 4, 3))
+    feet[0, 0] = [0.2, 0.0, 0.0]
+    model = linearise(np.array([x, x]), np.zeros((1, 12)), feet, np.diag([0.1, 0.4, 0.5]), 0.01)
+    np.testing.assert_allclose(model.B[0, 6:9, 2], [0, -0.2 * FORCE_UNIT / 0.4 * 0.01, 0], atol=1e-12)
+    np.testing.assert_allclose(model.B[0, 6:9, 0], [0, -0.28 * FORCE_UNIT / 0.4 * 0.01, 0], atol=1e-12)
+
+
+def test_an_interval_is_linearised_in_its_middle():
+    ends = np.array([POINT, POINT])
+    ends[1, :3] += [0.1, -0.2, np.pi / 2]
+    ends[0, 3:6] -= 0.05
+    middle = (ends[0] + ends[1]) / 2
+    a = linearise(ends, INPUT[None], FEET[None], INERTIA_B, 0.02)
+    b = at_point(0.02, middle)
+    for name in ("A", "B", "c"):
+        np.testing.assert_allclose(getattr(a, name), getattr(b, name), atol=1e-12)
+    assert np.abs(at_point(0.02).B - b.B).max() > 1e-3, "the inertia turns with the attitude"
+
+
+def test_intervals_do_not_mix():
+    rng = np.random.default_rng(3)
+    states, inputs = POINT + 0.1 * rng.normal(size=(5, 12)), INPUT + 0.1 * rng.normal(size=(4, 12))
+    feet = FEET + 0.05 * rng.normal(size=(4, 4, 3))
+    together = linearise(states, inputs, feet, INERTIA_B, 0.02)
+    for k in range(4):
+        alone = linearise(states[k : k + 2], inputs[k : k + 1], feet[k : k + 1], INERTIA_B, 0.02)
+        for name in ("A", "B", "c"):
+            np.testing.assert_allclose(getattr(together, name)[k], getattr(alone, name)[0], atol=1e-13)

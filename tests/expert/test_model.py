@@ -121,6 +121,43 @@ def moved(model: RobotModel, state: RobotState, seconds: float) -> RobotState:
     return replace(there, linear_velocity_w=there.rotation @ v[:3])
 
 
+def test_mean_omega_is_mujocos_angular_momentum_over_the_inertia(model, env):
+    rng, m, data = np.random.default_rng(4), env.simulation.model, env.simulation.data
+    for _ in range(20):
+        dynamics = model.dynamics(random_state(env, rng))
+        mujoco.mj_subtreeVel(m, data)
+        momentum = data.subtree_angmom[m.body("trunk").id]
+        np.testing.assert_allclose(dynamics.inertia_w @ dynamics.mean_omega_w, momentum, atol=1e-9)
+
+
+def test_a_rigid_robot_turns_as_a_whole(model, env):
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        state = replace(random_state(env, rng), v=np.zeros(12))
+        turning = state.rotation @ state.angular_velocity_b
+        np.testing.assert_allclose(model.dynamics(state).mean_omega_w, turning, atol=1e-9)
+
+
+def test_lean_follows_the_joints_to_first_order(model, env):
+    """At the home pose its rate is mean_omega less the trunk's, whatever the trunk does; away from it nearly so."""
+    rng, step = np.random.default_rng(6), 1e-6
+    errors = []
+    for away in (0.0, 0.02, 0.04):
+        worst = []
+        for seed in range(10):
+            state = random_state(env, np.random.default_rng(seed))
+            pose = robot.HOME_POSE + away * np.random.default_rng(seed).normal(size=12)
+            state = replace(state, q=pose, v=rng.normal(size=12))
+            ahead, behind = (model.dynamics(replace(state, q=pose + t * state.v)).lean_w for t in (step, -step))
+            turning = model.dynamics(state).mean_omega_w - state.rotation @ state.angular_velocity_b
+            worst.append(np.abs((ahead - behind) / (2 * step) - turning).max())
+            assert np.abs(turning).max() > 0.01
+        errors.append(np.mean(worst))
+    assert errors[0] < 1e-7
+    assert 0 < errors[1] < errors[2] < 3 * errors[1] < 0.1
+    assert not model.dynamics(replace(state, q=robot.HOME_POSE)).lean_w.any()
+
+
 def test_drift_is_the_feets_acceleration_at_zero_vdot(model, env):
     rng, step = np.random.default_rng(2), 1e-5
     for _ in range(20):

@@ -8,12 +8,16 @@ import pytest
 
 from experts import NMPCExpert
 from experts.model import RobotModel
-from experts.phase import SAMPLES, PhaseScales, _cycle, fit_phase
+from experts.nominal import nominal_motion
+from experts.phase import LAG_S, SAMPLES, TRAIL_S, PhaseScales, _cycle, fit_phase
+from experts.swing import SwingRule
 from go1_mtl_gym import GAITS, robot
 from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.state import RobotState
+from go1_mtl_gym.tasks import TASKS
 
-COMMANDS = {"slow": (0.1, 0.0, 0.0), "middle": (0.4, 0.1, 0.2), "fast": (0.8, 0.1, 0.5)}
+MIDDLE = (0.4, 0.1, 0.2)
+SWING, HEIGHT = SwingRule(press=0.003, early=0.1), 0.28
 EVERY = pytest.mark.parametrize("gait", GAITS.values(), ids=list(GAITS))
 
 
@@ -39,12 +43,20 @@ def model() -> RobotModel:
 
 
 @pytest.mark.parametrize("task", GAITS)
-@pytest.mark.parametrize("command", COMMANDS.values(), ids=list(COMMANDS))
-def test_recovers_the_clock(model, task, command):
-    states = walked(task, command)
+@pytest.mark.parametrize("fast", [False, True], ids=["middle", "fast"])
+def test_recovers_the_clock(model, task, fast):
+    states = walked(task, TASKS[task].command_range if fast else MIDDLE)
     error = [apart(fit_phase(state, model).phase, state.phase) for state in states]
     assert np.median(error) < 0.02
-    assert np.percentile(error, 95) < (0.075 if (task, command) == ("walk", COMMANDS["fast"]) else 0.06)
+    assert np.percentile(error, 95) < 0.06
+
+
+@pytest.mark.parametrize("task", GAITS)
+def test_is_less_sure_when_the_robot_hardly_moves(model, task):
+    states = walked(task, (0.1, 0.0, 0.0))
+    error = [apart(fit_phase(state, model).phase, state.phase) for state in states]
+    assert np.median(error) < 0.025
+    assert np.percentile(error, 95) < 0.12
 
 
 def test_fits_what_was_pushed(model, driven):
@@ -55,13 +67,13 @@ def test_fits_what_was_pushed(model, driven):
 
 def test_error_tells_the_gait(model):
     for task in GAITS:
-        states = walked(task, COMMANDS["middle"], steps=30)
+        states = walked(task, MIDDLE, steps=30)
         error = {
             name: np.mean([fit_phase(replace(state, gait=gait), model).error for state in states])
             for name, gait in GAITS.items()
         }
         assert min(error, key=error.get) == task
-        assert error[task] < 1.0
+        assert error[task] < (1.5 if task == "walk" else 0.8)
 
 
 def test_the_clock_and_the_place_do_not_matter(model, driven):
@@ -100,7 +112,7 @@ def test_a_wrong_clock_is_put_right(driven):
 
 @EVERY
 def test_cycle_is_continuous_and_its_velocities_are_derivatives(gait):
-    cycle = _cycle(gait, 0.1, 0.0, (0.1, 0.3))
+    cycle = _cycle(gait, SwingRule(press=0.0), HEIGHT)
     step = gait.period / SAMPLES
     for values, rate, size in ((cycle.height, cycle.climb, 0.12), (cycle.place, cycle.speed - 1.0, 1.0)):
         numeric = (np.roll(values, -1, axis=0) - np.roll(values, 1, axis=0)) / (2 * step)
@@ -112,20 +124,46 @@ def test_cycle_is_continuous_and_its_velocities_are_derivatives(gait):
 
 def test_stance_foot_goes_from_half_a_stride_before_to_half_behind():
     gait = GAITS["trot"]
-    cycle = _cycle(gait, 0.1, 0.003, (0.1, 0.3))
-    leg = gait.leg_phase(np.arange(SAMPLES) / SAMPLES)
+    cycle = _cycle(gait, SWING, HEIGHT)
+    leg = gait.leg_phase(np.arange(SAMPLES) / SAMPLES - LAG_S / gait.period)
     stance = leg < gait.duty
-    np.testing.assert_allclose(cycle.place[stance], gait.stance_s / 2 - leg[stance] * gait.period, atol=1e-12)
+    where = gait.stance_s / 2 - leg[stance] * gait.period - TRAIL_S
+    np.testing.assert_allclose(cycle.place[stance], where, atol=1e-12)
     assert not cycle.speed[stance].any() and not cycle.climb[stance].any()
     np.testing.assert_array_equal(cycle.height[stance], robot.FOOT_RADIUS)
+    assert cycle.height.min() == robot.FOOT_RADIUS, "a foot does not sink"
     assert cycle.height.max() == pytest.approx(robot.FOOT_RADIUS + gait.swing_height, abs=2e-3)
+
+
+def test_a_pacing_bodys_feet_are_drawn_aside_by_the_sway():
+    """Left feet stand for .176 s while the body, pushed to the right by them, comes back from the left side."""
+    gait = GAITS["pace"]
+    cycle, motion = _cycle(gait, SWING, HEIGHT), nominal_motion(gait, (0.127, 0.394, 0.423), 0.257)
+    assert np.abs(cycle.drawn.imag).max() < np.ptp(motion.position[:, 4]) + 1e-9
+    assert np.abs(cycle.drawn.imag).max() > 0.3 * np.ptp(motion.position[:, 4]) > 1e-3
+    swinging = ~gait.stance(np.arange(SAMPLES) / SAMPLES - LAG_S / gait.period)
+    assert not cycle.drawn[swinging].any()
+    np.testing.assert_allclose(cycle.sway.imag, motion.velocity[:, 4], atol=1e-3)
+
+
+def test_the_foot_is_down_when_its_arc_meets_the_ground_by_hand():
+    """16 h s^2 (1 - s)^2 = press s^2 at s = 1 - sqrt(press / 16 h): .944 for 3 mm and 60 mm."""
+    gait = GAITS["trot"]
+    cycle, s = _cycle(gait, SWING, HEIGHT), 1 - np.sqrt(0.003 / 0.96)
+    leg = gait.leg_phase(np.arange(SAMPLES) / SAMPLES - LAG_S / gait.period)
+    meets = gait.duty + s * 0.9 * (1 - gait.duty)
+    for foot in range(4):
+        in_air = cycle.height[:, foot] > robot.FOOT_RADIUS
+        assert leg[in_air, foot].max() < meets < leg[in_air, foot].max() + 1.001 / SAMPLES
+        near = np.abs(leg[:, foot] - meets) < 0.5 / SAMPLES + 1e-9
+        np.testing.assert_allclose(cycle.ground[near, foot], 0.5, atol=0.1)
 
 
 def test_scales_matter(model):
     """With everything but the contacts ignored the answer is coarser, but not arbitrary."""
-    others = ("height", "climb", "place", "speed", "level", "heave", "tilt", "rate")
+    others = ("height", "climb", "place", "speed", "level", "heave", "sway", "tilt", "rate")
     only = PhaseScales(**dict.fromkeys(others, 1e6))
-    states = walked("walk", COMMANDS["middle"], steps=60)
+    states = walked("walk", MIDDLE, steps=60)
     coarse = [apart(fit_phase(state, model, only).phase, state.phase) for state in states]
     fine = [apart(fit_phase(state, model).phase, state.phase) for state in states]
     assert np.mean(fine) < np.mean(coarse) < 0.2

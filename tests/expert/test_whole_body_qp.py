@@ -30,7 +30,7 @@ def demands(model: RobotModel, states: list, kind: str) -> list[tuple]:
         forces = rng.normal(0, 0.1 * share, (4, 3)) + [0, 0, share]
         swing = rng.normal(0, 60, (4, 3))
         if kind == "force":
-            forces *= 2.5 * (1 + stance.sum() // 3)
+            forces *= 3.5 * (1 + stance.sum() // 3)
         elif kind == "swing":
             swing *= 5.0
         elif kind == "slip":
