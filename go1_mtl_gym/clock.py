@@ -29,3 +29,8 @@ def next_phase(gait: Gait, phase: float, command: np.ndarray, seconds: float) ->
     if asks_to_stand(gait, command) and (phase == 0.0 or turns >= 1.0 - _SLACK):
         return 0.0
     return turns % 1.0
+
+
+def passes(mark: float, before: float, after: float) -> bool:
+    """Whether the clock came to, or past, a phase between two readings less than a cycle apart; all in [0, 1)."""
+    return (mark - before) % 1.0 <= (after - before) % 1.0

@@ -240,7 +240,8 @@ class Go1Env(gymnasium.Env):
 
         Args:
             task: name of the new one.
-            phase: of its gait [cycles], in [0, 1); None keeps the clock's.
+            phase: of its gait [cycles], in [0, 1), at once; None lets it begin at phase 0, at once but for gaits that
+                leave the ground with all feet: those go on until the middle of their stance (`Gait.change_phase`).
 
         Raises:
             InvalidInputError: if the task is unknown here, does not allow the present command, or the phase is none.
@@ -248,8 +249,7 @@ class Go1Env(gymnasium.Env):
         episode = self._running("set_task")
         new = TASKS[one_of(task, self.tasks, "task")]
         new.check_command(episode.command)
-        episode.phase = episode.phase if phase is None else check_phase(phase)
-        episode.task = new
+        episode.change_task(new, None if phase is None else check_phase(phase))
 
     def set_command(self, command: Sequence[float]) -> None:
         """Ask for another (vx [m/s], vy [m/s], yaw rate [rad/s]); it is low-passed before expert and student see it.
@@ -258,7 +258,7 @@ class Go1Env(gymnasium.Env):
             InvalidInputError: if it is not three finite numbers within the task's `command_limit`.
         """
         episode = self._running("set_command")
-        episode.command = episode.task.check_command(command)
+        episode.command = (episode.next_task or episode.task).check_command(command)
 
     def push(self, delta_velocity_w: Sequence[float]) -> None:
         """Kick the trunk: add to its linear velocity [m/s], world frame, shape (3,).

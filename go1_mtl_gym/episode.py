@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from go1_mtl_gym.clock import next_phase
+from go1_mtl_gym.clock import next_phase, passes
 from go1_mtl_gym.estimator import EstimatorError
 from go1_mtl_gym.state import RobotState
 from go1_mtl_gym.tasks import Task
@@ -45,6 +45,7 @@ class Episode:
         phase: the gait clock [cycles], in [0, 1).
         steps: control periods since the reset.
         time_s: since the reset [s].
+        next_task: what will be asked for as soon as the present gait can be left, or None.
         estimator_error: what the expert's state estimator gets wrong, or None for the true state.
     """
 
@@ -56,6 +57,7 @@ class Episode:
     phase: float = 0.0
     steps: int = 0
     time_s: float = 0.0
+    next_task: Task | None = None
     estimator_error: EstimatorError | None = None
 
     def advance(self, control_s: float) -> None:
@@ -63,12 +65,22 @@ class Episode:
 
         The clock obeys the filtered command that expert and student saw at the beginning of the period.
         """
-        self.phase = next_phase(self.task.gait, self.phase, self.filtered_command, control_s)
+        before, mark = self.phase, self.task.gait.change_phase
+        self.phase = next_phase(self.task.gait, before, self.filtered_command, control_s)
+        if self.next_task is not None and (mark is None or before == self.phase or passes(mark, before, self.phase)):
+            self.change_task(self.next_task, 0.0)
         self.filtered_command = filtered(self.command, self.filtered_command, control_s)
         self.steps += 1
         self.time_s = self.steps * control_s
         if self.estimator_error is not None:
             self.estimator_error.advance()
+
+    def change_task(self, task: Task, phase: float | None) -> None:
+        """Change the task: at once to a phase, or with None to phase 0 as soon as the present gait can be left."""
+        if phase is None and self.task.gait.change_phase is not None and task != self.task:
+            self.next_task = task
+        else:
+            self.task, self.phase, self.next_task = task, phase or 0.0, None
 
     def estimated(self, state: RobotState) -> RobotState:
         """What the state estimator makes of the true state, now."""

@@ -67,6 +67,16 @@ class Gait:
         """Whether all feet are on the ground at phase 0, where the clock may stop."""
         return bool(self.stance(0.0).all())
 
+    @cached_property
+    def change_phase(self) -> float | None:
+        """Where a robot can leave this gait for another; None if anywhere.
+
+        A gait that throws all feet into the air at once and lands on all is left in the middle of its stance, where the
+        body neither rises nor falls.
+        """
+        flies = not self.stance(np.linspace(0.0, 1.0, 200, endpoint=False)).any(axis=1).all()
+        return float((self.duty - self.leg_phase(0.0)).min() / 2) if flies and self.can_stand else None
+
     @property
     def nominal_feet_b(self) -> np.ndarray:
         """Points of the trunk frame under which the feet stand in this gait [m], shape (4, 3), read-only.

@@ -117,4 +117,34 @@ def test_a_new_task_can_begin_at_a_phase():
     *_, info = env.step(home(env))
     assert info["phase"] == pytest.approx(0.25 + 0.02 / 0.32)
     env.set_task("walk")
-    assert env.state.phase == info["phase"]
+    assert env.state.phase == 0.0 and env.task.name == "walk", "a gait begins at phase 0"
+    env.set_task("jump", phase=0.7)
+    assert env.state.phase == 0.7 and env.task.name == "jump"
+
+
+def test_a_gait_that_flies_goes_on_until_the_middle_of_its_stance():
+    assert GAITS["jump"].change_phase == pytest.approx(0.275)
+    assert all(gait.change_phase is None for name, gait in GAITS.items() if name != "jump")
+    env = Go1Env("jump")
+    env.reset(seed=0, options={"command": (0.3, 0.0, 0.0)})
+    env.step(home(env)), env.step(home(env))
+    env.set_task("jump", phase=0.6)
+    env.set_task("trot")
+    seen = []
+    for _ in range(16):  # 0.675 cycles of 0.45 s are 15.2 steps
+        *_, info = env.step(home(env))
+        seen.append(info["task"])
+    assert seen == ["jump"] * 15 + ["trot"] and info["phase"] == 0.0
+    env.set_task("jump", phase=0.6)
+    env.set_task("trot")
+    env.set_task("walk"), env.set_task("jump")
+    for _ in range(40):
+        *_, info = env.step(home(env))
+    assert info["task"] == "jump", "the last word counts"
+
+
+def test_a_gait_that_rests_is_left_at_once():
+    env = Go1Env("jump")
+    env.reset(seed=0, options={"command": (0.0, 0.0, 0.0)})
+    env.set_task("trot")
+    assert env.step(home(env))[4]["task"] == "trot"

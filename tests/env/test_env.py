@@ -96,15 +96,15 @@ def test_an_episode_starts_standing_at_phase_zero():
     assert env.state.rpy.tolist() == [0, 0, 0] and not info["filtered_command"].any()
 
 
-def test_set_task_keeps_the_phase_and_the_command():
+def test_set_task_begins_the_gait_and_keeps_the_command():
     env = Go1Env("trot")
     env.reset(seed=0, options={"command": (0.3, 0.0, 0.1)})
     for _ in range(7):  # the first one still stands: the command has not arrived
         _, _, _, _, info = env.step(env.action_map.from_radians(robot.HOME_POSE))
     env.set_task("walk")
-    assert env.state.phase == info["phase"] == pytest.approx(0.3) and env.state.gait.name == "walk"
+    assert info["phase"] == pytest.approx(0.3) and env.state.phase == 0.0 and env.state.gait.name == "walk"
     observation, _, _, _, info = env.step(env.action_map.from_radians(robot.HOME_POSE))
-    assert info["phase"] == pytest.approx(0.3 + 0.02 / 0.6) and info["task"] == "walk"
+    assert info["phase"] == pytest.approx(0.02 / 0.6) and info["task"] == "walk"
     assert observation[34:].tolist() == [0, 0, 0, 1, 0, 0] and info["command"].tolist() == [0.3, 0.0, 0.1]
 
 
