@@ -23,6 +23,8 @@ MODES = {
     "converged SQP": NMPCConfig(sqp_iterations=20, sqp_tolerance=1e-3),
 } | {f"whole body: {name}": NMPCConfig(whole_body=name) for name in WHOLE_BODY if name != NMPCConfig().whole_body}
 """Settings of the expert that are compared with each other, by name."""
+MPC_HZ = 100
+"""Where control is faster than this, forces are planned at this rate and the whole body is solved at every step [Hz]."""
 MODE_TASKS = ("trot", "bound", "jump")
 """Gaits on which they are compared."""
 
@@ -129,11 +131,14 @@ def quantiles(seconds: np.ndarray) -> dict[str, float]:
 def real_time(lab: Lab, task: str, rate: int, config: TimingConfig, seed: int) -> dict[str, float]:
     """Simulated seconds per second of one core at a control rate, medians of blocks that take turns.
 
+    The expert plans forces at most at `MPC_HZ`.
+
     Returns:
         "expert" in the loop; "environment", the same without the expert, standing; "physics", MuJoCo alone; and
         "expert_to_physics", which depends less on the machine.
     """
-    walking, standing = Lab(rate), Lab(rate)
+    slower = NMPCConfig(mpc_hz=MPC_HZ if rate > MPC_HZ else None)
+    walking, standing = Lab(rate, partial(NMPCExpert, config=slower)), Lab(rate)
     for own in (walking, standing):
         own.begin(task, CRUISE, "timing", seed)
     walking.walk(0.5)

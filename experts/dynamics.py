@@ -24,6 +24,7 @@ The affine model dx/dt = A x + B u + c that agrees with (1)-(4) at (x', u') is d
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from go1_mtl_gym import robot
 
@@ -31,7 +32,7 @@ FORCE_UNIT = robot.MASS * robot.GRAVITY / 2
 """One unit of the MPC's inputs [N]."""
 RPY, COM, OMEGA, VELOCITY = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
 """Where the parts of a state stand."""
-_SUM = np.tile(np.eye(3), 4)  # (3, 12): total of the four forces
+_PER_MASS = FORCE_UNIT / robot.MASS
 
 
 @dataclass(frozen=True)
@@ -49,29 +50,25 @@ class LinearModel:
     c: np.ndarray
 
 
-def euler_rate_matrix(rpy: np.ndarray) -> np.ndarray:
-    """E of equation (1), shape (..., 3, 3), from roll, pitch, yaw [rad] of shape (..., 3)."""
-    return _euler_rates(rpy, np.zeros_like(rpy))[0]
-
-
 def cross_matrix(r: np.ndarray) -> np.ndarray:
-    """[r] with [r] f = r x f, shape (..., 3, 3)."""
-    out = np.zeros((*r.shape, 3))
-    x, y, z = r[..., 0], r[..., 1], r[..., 2]
-    out[..., 0, 1], out[..., 0, 2] = -z, y
-    out[..., 1, 0], out[..., 1, 2] = z, -x
-    out[..., 2, 0], out[..., 2, 1] = -y, x
+    """[r] with [r] f = r x f, shape (3, 3)."""
+    out = np.empty((3, 3))
+    _cross(np.asarray(r, dtype=np.float64), out, 1.0)
     return out
 
 
 def rotation_matrix(rpy: np.ndarray) -> np.ndarray:
-    """R = Rz(yaw) Ry(pitch) Rx(roll), body to world, shape (N, 3, 3), of shape (N, 3)."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy).T, np.sin(rpy).T
-    out = np.empty((*rpy.shape, 3))
-    out[..., 0, 0], out[..., 0, 1], out[..., 0, 2] = cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr
-    out[..., 1, 0], out[..., 1, 1], out[..., 1, 2] = sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr
-    out[..., 2, 0], out[..., 2, 1], out[..., 2, 2] = -sp, cp * sr, cp * cr
+    """R = Rz(yaw) Ry(pitch) Rx(roll), body to world, shape (3, 3)."""
+    out = np.empty((3, 3))
+    _rotation(np.asarray(rpy, dtype=np.float64), out)
     return out
+
+
+def euler_rate_matrix(rpy: np.ndarray) -> np.ndarray:
+    """E of equation (1), shape (3, 3), from roll, pitch, yaw [rad] of shape (3,)."""
+    E, W = np.empty((3, 3)), np.empty((3, 3))
+    _euler_rates(np.asarray(rpy, dtype=np.float64), np.zeros(3), E, W)
+    return E
 
 
 def linearise(
@@ -86,57 +83,111 @@ def linearise(
         inertia_b: composite inertia about the centre of mass, trunk axes [kg m^2], shape (3, 3).
         dt: interval [s].
     """
-    steps = len(inputs)
-    x = (states[:-1] + states[1:]) / 2
-    rpy, com, omega = x[:, RPY], x[:, COM], x[:, OMEGA]
-    rotation = rotation_matrix(rpy)
-    back = rotation.transpose(0, 2, 1)
-    inertia, inverse = rotation @ inertia_b @ back, rotation @ np.linalg.inv(inertia_b) @ back
-    spin, momentum = cross_matrix(omega), _times(inertia, omega)
-    total = inputs.reshape(steps, 4, 3).sum(axis=1) * FORCE_UNIT
-
-    # Rows [rpy, omega] of the continuous model; columns [rpy, omega | p | u | c].
-    rows = np.zeros((steps, 6, 22))
-    rows[:, 3:, 3:6] = cross_matrix(momentum) - spin @ inertia
-    rows[:, 3:, 6:9] = cross_matrix(total)
-    rows[:, 3:, 9:21] = cross_matrix(feet_w - com[:, None]).transpose(0, 2, 1, 3).reshape(steps, 3, 12) * FORCE_UNIT
-    rows[:, 3:, 21] = -_times(spin, momentum)
-    rows[:, 3:] = inverse @ rows[:, 3:]
-    E, W = _euler_rates(rpy, omega)
-    rows[:, :3, :3], rows[:, :3, 3:6] = W, E
-    rows[:, :3, 21] = -_times(W, rpy)
-    rows[:, 3:, 21] -= _times(rows[:, 3:, 3:9], np.hstack([omega, com]))
-
-    half = dt * dt / 2
-    discrete = (rows[:, :, :6] * half + dt * np.eye(6)) @ rows
-    A, B, c = np.zeros((steps, 12, 12)), np.empty((steps, 12, 12)), np.empty((steps, 12))
-    for at, own in ((RPY, discrete[:, :3]), (OMEGA, discrete[:, 3:])):
-        A[:, at, RPY], A[:, at, OMEGA], A[:, at, COM] = own[..., :3], own[..., 3:6], own[..., 6:9]
-        B[:, at], c[:, at] = own[..., 9:21], own[..., 21]
-    A[:, OMEGA, VELOCITY] = rows[:, 3:, 6:9] * half
-    A[:, COM, VELOCITY] = np.eye(3) * dt
-    A.reshape(steps, 144)[:, ::13] += 1.0
-    B[:, COM], c[:, COM] = _SUM * (FORCE_UNIT / robot.MASS * half), (0.0, 0.0, -robot.GRAVITY * half)
-    B[:, VELOCITY], c[:, VELOCITY] = _SUM * (FORCE_UNIT / robot.MASS * dt), (0.0, 0.0, -robot.GRAVITY * dt)
-    return LinearModel(A, B, c)
+    middle = (states[:-1] + states[1:]) / 2
+    return LinearModel(*_linearise(middle, inputs * FORCE_UNIT, feet_w, inertia_b, np.linalg.inv(inertia_b), dt))
 
 
-def _times(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    return (matrices * vectors[:, None]).sum(axis=-1)
+@njit(cache=True)
+def _cross(r, out, scale):
+    out[0, 0] = out[1, 1] = out[2, 2] = 0.0
+    out[0, 1], out[0, 2], out[1, 2] = -r[2] * scale, r[1] * scale, -r[0] * scale
+    out[1, 0], out[2, 0], out[2, 1] = r[2] * scale, -r[1] * scale, r[0] * scale
 
 
-def _euler_rates(rpy: np.ndarray, omega: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """E and W of equation (5), each of shape (..., 3, 3)."""
-    pitch, yaw = rpy[..., 1], rpy[..., 2]
-    cos, sin, tan = np.cos(yaw), np.sin(yaw), np.tan(pitch)
-    sec = 1 / np.cos(pitch)
-    E = np.zeros((*rpy.shape, 3))
-    E[..., 0, 0], E[..., 0, 1] = cos * sec, sin * sec
-    E[..., 1, 0], E[..., 1, 1] = -sin, cos
-    E[..., 2, 0], E[..., 2, 1], E[..., 2, 2] = cos * tan, sin * tan, 1.0
-    forward, side = cos * omega[..., 0] + sin * omega[..., 1], cos * omega[..., 1] - sin * omega[..., 0]
-    W = np.zeros_like(E)
-    W[..., 0, 1], W[..., 0, 2] = forward * tan * sec, side * sec
-    W[..., 1, 2] = -forward
-    W[..., 2, 1], W[..., 2, 2] = forward * sec**2, side * tan
-    return E, W
+@njit(cache=True)
+def _rotation(rpy, R):
+    cr, cp, cy = np.cos(rpy[0]), np.cos(rpy[1]), np.cos(rpy[2])
+    sr, sp, sy = np.sin(rpy[0]), np.sin(rpy[1]), np.sin(rpy[2])
+    R[0, 0], R[0, 1], R[0, 2] = cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr
+    R[1, 0], R[1, 1], R[1, 2] = sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr
+    R[2, 0], R[2, 1], R[2, 2] = -sp, cp * sr, cp * cr
+
+
+@njit(cache=True)
+def _euler_rates(rpy, omega, E, W):
+    """E and W of equations (1) and (5)."""
+    cos, sin, tan, sec = np.cos(rpy[2]), np.sin(rpy[2]), np.tan(rpy[1]), 1 / np.cos(rpy[1])
+    E[0, 0], E[0, 1], E[0, 2] = cos * sec, sin * sec, 0.0
+    E[1, 0], E[1, 1], E[1, 2] = -sin, cos, 0.0
+    E[2, 0], E[2, 1], E[2, 2] = cos * tan, sin * tan, 1.0
+    forward, side = cos * omega[0] + sin * omega[1], cos * omega[1] - sin * omega[0]
+    W[:, 0] = 0.0
+    W[0, 1], W[0, 2] = forward * tan * sec, side * sec
+    W[1, 1], W[1, 2] = 0.0, -forward
+    W[2, 1], W[2, 2] = forward * sec * sec, side * tan
+
+
+@njit(cache=True)
+def _congruent(R, inner, out):
+    """out = R inner R'."""
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = 0.0
+            for a in range(3):
+                for b in range(3):
+                    out[i, j] += R[i, a] * inner[a, b] * R[j, b]
+
+
+@njit(cache=True)
+def _linearise(x, forces, feet_w, inertia_b, inverse_b, dt):
+    """`linearise` at states x with forces in N; compiled, without temporary arrays inside the loop."""
+    steps, half = len(x), dt * dt / 2
+    A, B, c = np.zeros((steps, 12, 12)), np.zeros((steps, 12, 12)), np.zeros((steps, 12))
+    R, E, W, K, G = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    inertia, inverse, moment, total = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 19)), np.empty(3)
+    rows, discrete, momentum = np.zeros((6, 22)), np.empty((6, 22)), np.empty(3)
+    for k in range(steps):
+        rpy, com, omega = x[k, 0:3], x[k, 3:6], x[k, 6:9]
+        _rotation(rpy, R)
+        _euler_rates(rpy, omega, E, W)
+        _congruent(R, inertia_b, inertia)
+        _congruent(R, inverse_b, inverse)
+        for i in range(3):
+            momentum[i] = inertia[i, 0] * omega[0] + inertia[i, 1] * omega[1] + inertia[i, 2] * omega[2]
+            total[i] = forces[k, i] + forces[k, 3 + i] + forces[k, 6 + i] + forces[k, 9 + i]
+
+        # I domega/dt: columns [omega | p | u | constant], then times I^-1.
+        _cross(total, moment[:, 3:6], 1.0)
+        for leg in range(4):
+            _cross(feet_w[k, leg] - com, moment[:, 6 + 3 * leg : 9 + 3 * leg], FORCE_UNIT)
+        _cross(momentum, G, 1.0)
+        _cross(omega, K, 1.0)
+        for i in range(3):
+            moment[i, 18] = 0.0
+            for j in range(3):
+                moment[i, j] = G[i, j] - (K[i, 0] * inertia[0, j] + K[i, 1] * inertia[1, j] + K[i, 2] * inertia[2, j])
+                moment[i, 18] -= K[i, j] * momentum[j]
+
+        # Rows [rpy, omega] of the continuous model; columns [rpy, omega | p | u | c].
+        for i in range(3):
+            for j in range(3):
+                rows[i, j], rows[i, 3 + j] = W[i, j], E[i, j]
+            rows[i, 21] = -(W[i, 0] * rpy[0] + W[i, 1] * rpy[1] + W[i, 2] * rpy[2])
+            for j in range(19):
+                rows[3 + i, 3 + j] = (
+                    inverse[i, 0] * moment[0, j] + inverse[i, 1] * moment[1, j] + inverse[i, 2] * moment[2, j]
+                )
+            for j in range(3):
+                rows[3 + i, 21] -= rows[3 + i, 3 + j] * omega[j] + rows[3 + i, 6 + j] * com[j]
+
+        for i in range(6):
+            for j in range(22):
+                value = rows[i, j] * dt
+                for l in range(6):
+                    value += rows[i, l] * rows[l, j] * half
+                discrete[i, j] = value
+        for i in range(3):
+            for j in range(3):
+                A[k, i, j], A[k, i, 3 + j], A[k, i, 6 + j] = discrete[i, j], discrete[i, 6 + j], discrete[i, 3 + j]
+                A[k, 6 + i, j], A[k, 6 + i, 6 + j] = discrete[3 + i, j], discrete[3 + i, 3 + j]
+                A[k, 6 + i, 3 + j], A[k, 6 + i, 9 + j] = discrete[3 + i, 6 + j], rows[3 + i, 6 + j] * half
+            for j in range(12):
+                B[k, i, j], B[k, 6 + i, j] = discrete[i, 9 + j], discrete[3 + i, 9 + j]
+            for leg in range(4):
+                B[k, 3 + i, 3 * leg + i], B[k, 9 + i, 3 * leg + i] = _PER_MASS * half, _PER_MASS * dt
+            A[k, 3 + i, 9 + i] = dt
+            c[k, i], c[k, 6 + i] = discrete[i, 21], discrete[3 + i, 21]
+        for i in range(12):
+            A[k, i, i] += 1.0
+        c[k, 5], c[k, 11] = -robot.GRAVITY * half, -robot.GRAVITY * dt
+    return A, B, c

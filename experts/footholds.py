@@ -3,8 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
-from experts.planar import carried, to_complex, turn
+from experts.planar import to_complex
 from go1_mtl_gym import robot
 from go1_mtl_gym.gaits import Gait
 from go1_mtl_gym.state import RobotState
@@ -46,17 +47,17 @@ class FootholdRule:
         Returns:
             Centres of the feet on the ground, world [m], shape (..., 4, 3).
         """
-        vx, vy, yaw_rate = state.command.tolist()
-        heading = turn(state.rpy[2])
-        velocity, velocity_ref = to_complex(velocity_w), complex(vx, vy) * heading
-        arm = to_complex(state.gait.nominal_feet_b) * heading * turn(yaw_rate * touchdown_s)
-        step = (velocity + carried(arm, yaw_rate)) * (state.gait.stance_s / 2)
-        step += self.velocity_gain * (velocity - velocity_ref)
-        step *= np.minimum(1.0, self.reach / np.maximum(np.abs(step), 1e-9))
-        point = to_complex(com_w) + velocity * touchdown_s + arm + step
-        feet = np.empty((*touchdown_s.shape, 3))
-        feet[..., 0], feet[..., 1], feet[..., 2] = point.real, point.imag, robot.FOOT_RADIUS
-        return feet
+        times = touchdown_s.reshape(-1, 4)
+        feet = _plan(
+            to_complex(com_w),
+            to_complex(velocity_w),
+            state.rpy[2],
+            state.command,
+            state.gait.nominal_feet_b,
+            np.array([state.gait.stance_s / 2, self.velocity_gain, self.reach]),
+            times,
+        )
+        return feet.reshape(*touchdown_s.shape, 3)
 
     def over_horizon(
         self, state: RobotState, com_w: np.ndarray, velocity_w: np.ndarray, feet_w: np.ndarray, middle: np.ndarray
@@ -84,3 +85,21 @@ def next_touchdown(gait: Gait, phase: float, later: np.ndarray) -> np.ndarray:
     """Time from `phase` until the touchdown that begins the leg cycle running at clocks `later` [s], shape (N, 4)."""
     offsets = np.array(gait.offsets)
     return (np.floor(later[:, None] + offsets) - offsets - phase) * gait.period
+
+
+@njit(cache=True)
+def _plan(com, velocity, yaw, command, feet_b, rule, touchdown_s):
+    """`FootholdRule.plan` in complex numbers, x + iy; compiled. `rule`: half a stance [s], gain [s], reach [m]."""
+    half_stance, gain, reach = rule
+    heading = np.exp(1j * yaw)
+    wanted = (command[0] + 1j * command[1]) * heading
+    feet = np.empty((len(touchdown_s), 4, 3))
+    for i in range(len(touchdown_s)):
+        for leg in range(4):
+            time = touchdown_s[i, leg]
+            arm = (feet_b[leg, 0] + 1j * feet_b[leg, 1]) * heading * np.exp(1j * command[2] * time)
+            step = (velocity + 1j * command[2] * arm) * half_stance + gain * (velocity - wanted)
+            step *= min(1.0, reach / max(abs(step), 1e-9))
+            point = com + velocity * time + arm + step
+            feet[i, leg, 0], feet[i, leg, 1], feet[i, leg, 2] = point.real, point.imag, robot.FOOT_RADIUS
+    return feet

@@ -1,9 +1,9 @@
 """Where the body should be over the horizon: the command, integrated from here, plus the gait's nominal motion."""
 
 import numpy as np
+from numba import njit
 
 from experts.nominal import NominalMotion
-from experts.planar import to_complex, turn
 from go1_mtl_gym.state import RobotState
 
 
@@ -29,20 +29,31 @@ def body_reference(
         (N + 1, 12); index 0 is now.
     """
     time = np.arange(steps + 1) * dt
-    vx, vy, yaw_rate = state.command.tolist()
     deviation = motion.at(state.phase + time / state.gait.period)
-    yaw = yaw + yaw_rate * time
-    heading = turn(yaw)
-    sway, swaying, rolling = (to_complex(deviation[:, at : at + 2]) * heading for at in (3, 9, 6))
-    velocity = complex(vx, vy) * heading
-    position = np.empty(steps + 1, complex)
-    position[0] = 0.0
-    np.cumsum((velocity[1:] + velocity[:-1]) * (dt / 2), out=position[1:])
-    position += to_complex(com_w) + sway - sway[0]
-    velocity += swaying
-    x = np.empty((steps + 1, 12))
-    x[:, 0:2], x[:, 2] = deviation[:, 0:2], yaw + deviation[:, 2] - deviation[0, 2]
-    x[:, 3], x[:, 4], x[:, 5] = position.real, position.imag, com_height + deviation[:, 5]
-    x[:, 6], x[:, 7], x[:, 8] = rolling.real, rolling.imag, yaw_rate + deviation[:, 8]
-    x[:, 9], x[:, 10], x[:, 11] = velocity.real, velocity.imag, deviation[:, 11]
+    return _integrate(deviation, yaw, com_w, com_height, state.command, dt)
+
+
+@njit(cache=True)
+def _integrate(deviation, yaw, com_w, com_height, command, dt):
+    """`body_reference` from the nominal motion's deviations; compiled."""
+    x = np.empty((len(deviation), 12))
+    vx, vy, yaw_rate = command
+    px, py = com_w[0], com_w[1]
+    before_x, before_y = 0.0, 0.0
+    for k in range(len(x)):
+        angle = yaw + yaw_rate * k * dt
+        cos, sin = np.cos(angle), np.sin(angle)
+        going_x, going_y = cos * vx - sin * vy, sin * vx + cos * vy
+        if k:
+            px, py = px + (going_x + before_x) * dt / 2, py + (going_y + before_y) * dt / 2
+        before_x, before_y = going_x, going_y
+        d, first = deviation[k], deviation[0]
+        x[k, 0], x[k, 1], x[k, 2] = d[0], d[1], angle + d[2] - first[2]
+        cos_0, sin_0 = np.cos(yaw), np.sin(yaw)
+        x[k, 3] = px + (cos * d[3] - sin * d[4]) - (cos_0 * first[3] - sin_0 * first[4])
+        x[k, 4] = py + (sin * d[3] + cos * d[4]) - (sin_0 * first[3] + cos_0 * first[4])
+        x[k, 5] = com_height + d[5]
+        x[k, 6], x[k, 7], x[k, 8] = cos * d[6] - sin * d[7], sin * d[6] + cos * d[7], yaw_rate + d[8]
+        x[k, 9], x[k, 10] = going_x + cos * d[9] - sin * d[10], going_y + sin * d[9] + cos * d[10]
+        x[k, 11] = d[11]
     return x

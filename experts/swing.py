@@ -3,10 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from experts.footholds import FootholdRule
 from experts.model import Dynamics
-from experts.planar import carried, to_complex
+from experts.planar import to_complex
 from go1_mtl_gym import robot
 from go1_mtl_gym.state import RobotState
 
@@ -58,41 +59,63 @@ class SwingRule:
         gait = state.gait
         leg = (gait.leg_phase(state.phase) + ahead_s / gait.period) % 1.0
         progress = np.maximum(leg - gait.duty, 0.0) / (1.0 - gait.duty)
-        s = np.minimum(progress / (1.0 - self.early), 1.0)
-        time = gait.swing_s * (1.0 - self.early)
         remaining = (1.0 - progress) * gait.swing_s + ahead_s
-        landing = to_complex(footholds.plan(state, dynamics.com_w, velocity_w, remaining))
-        arm = landing - to_complex(dynamics.com_w)
-        stride = (to_complex(velocity_w) + carried(arm, state.command[2])) * gait.period
-
-        left, rate, curvature = cubic(s)
-        height, climb, bend = hump(s)
-        position = _spatial(landing - left * stride, gait.swing_height * height - self.press * s * s)
-        velocity = _spatial(rate * stride / -time, (gait.swing_height * climb - 2 * self.press * s) / time)
-        forward = _spatial(curvature * stride / -(time**2), (gait.swing_height * bend - 2 * self.press) / time**2)
-        position[:, 2] += robot.FOOT_RADIUS
-        down = progress >= 1.0 - self.early
-        velocity[down, 2], forward[down] = 0.0, 0.0
-        foot, foot_velocity = dynamics.feet_w, dynamics.feet_velocity_w
-        h = ahead_s[:, None]
-        wanted = (
-            forward
-            + self.stiffness * (position - foot - foot_velocity * h)
-            + self.damping * (velocity - foot_velocity)
+        landing = footholds.plan(state, dynamics.com_w, velocity_w, remaining)
+        arc = np.array([gait.swing_height, self.press, self.early, gait.swing_s, gait.period])
+        return _track(
+            progress,
+            ahead_s,
+            landing,
+            dynamics.feet_w,
+            dynamics.feet_velocity_w,
+            to_complex(dynamics.com_w),
+            to_complex(velocity_w) + 0j,
+            float(state.command[2]),
+            arc,
+            (self.stiffness, self.damping),
         )
-        return wanted / (1.0 + self.damping * h + self.stiffness * h**2 / 2)
 
 
-def _spatial(planar: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """(x, y, z) of complex x + iy and z, shape (4, 3)."""
-    return np.stack([planar.real, planar.imag, z], axis=1)
+@njit(cache=True)
+def _track(progress, ahead_s, landing, feet, feet_velocity, com, velocity, yaw_rate, arc, gains):
+    """`SwingRule.acceleration` for known landing points; compiled. `arc`: height, press, early, swing time, period."""
+    height, press, early, swing_s, period = arc
+    stiffness, damping = gains
+    time = swing_s * (1.0 - early)
+    wanted = np.empty((4, 3))
+    for leg in range(4):
+        s = min(progress[leg] / (1.0 - early), 1.0)
+        down = progress[leg] >= 1.0 - early
+        left, rate, curvature = cubic(s)
+        lift, climb, bend = hump(s)
+        arm = landing[leg, 0] + 1j * landing[leg, 1] - com
+        stride = (velocity + 1j * yaw_rate * arm) * period
+        h = ahead_s[leg]
+        for axis in range(3):
+            if axis == 2:
+                position = robot.FOOT_RADIUS + height * lift - press * s * s
+                speed, forward = (height * climb - 2 * press * s) / time, (height * bend - 2 * press) / time**2
+                if down:
+                    speed = 0.0
+            else:
+                along = stride.real if axis == 0 else stride.imag
+                position = landing[leg, axis] - left * along
+                speed, forward = -rate * along / time, -curvature * along / time**2
+            if down:
+                forward = 0.0
+            here, going = feet[leg, axis], feet_velocity[leg, axis]
+            pull = forward + stiffness * (position - here - going * h) + damping * (speed - going)
+            wanted[leg, axis] = pull / (1.0 + damping * h + stiffness * h * h / 2)
+    return wanted
 
 
-def cubic(s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+@njit(cache=True)
+def cubic(s):
     """1 - (3 s^2 - 2 s^3) and its first and second derivatives."""
     return 1 - s * s * (3 - 2 * s), -6 * s * (1 - s), -6 * (1 - 2 * s)
 
 
-def hump(s: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+@njit(cache=True)
+def hump(s):
     """16 s^2 (1 - s)^2 and its first and second derivatives."""
     return 16 * s**2 * (1 - s) ** 2, 32 * s * (1 - s) * (1 - 2 * s), 32 * (1 - 6 * s + 6 * s**2)

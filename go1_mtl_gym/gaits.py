@@ -1,7 +1,7 @@
 """Gaits as data: when each foot is on the ground, where it stands, and how high it swings."""
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from types import MappingProxyType
 
 import numpy as np
@@ -75,9 +75,13 @@ class Gait:
         """
         return _nominal_feet_b(self.stance_width)
 
+    @cached_property
+    def _offsets(self) -> np.ndarray:
+        return np.array(self.offsets)
+
     def leg_phase(self, phase: float | np.ndarray) -> np.ndarray:
         """Position of each leg in its own cycle, in [0, 1); shape of `phase` + (4,)."""
-        return np.mod(np.asarray(phase, dtype=np.float64)[..., None] + np.array(self.offsets), 1.0)
+        return np.mod(np.asarray(phase, dtype=np.float64)[..., None] + self._offsets, 1.0)
 
     def stance(self, phase: float | np.ndarray) -> np.ndarray:
         """Which legs should be on the ground; bool, shape of `phase` + (4,)."""
@@ -99,7 +103,7 @@ class Gait:
             Shape (steps, 4), in [0, 1]: 1 is on the ground throughout, 0 in the air throughout.
         """
         edges = phase + np.arange(steps + 1) * (dt / self.period)
-        turns = edges[:, None] + np.array(self.offsets)
+        turns = edges[:, None] + self._offsets
         ground = np.floor(turns) * self.duty + np.minimum(np.mod(turns, 1.0), self.duty)
         return np.clip(np.diff(ground, axis=0) / (dt / self.period), 0.0, 1.0)
 

@@ -70,12 +70,12 @@ class RobotState:
             ]
         )
 
-    @property
+    @cached_property
     def gravity_b(self) -> np.ndarray:
         """Unit vector of gravity in the base frame, shape (3,); (0, 0, -1) when level."""
         return -self.rotation[2]
 
-    @property
+    @cached_property
     def base_velocity(self) -> np.ndarray:
         """Measured (vx, vy [m/s], yaw rate [rad/s]) in the heading frame (world turned by yaw), shape (3,)."""
         yaw = self.rpy[2]
