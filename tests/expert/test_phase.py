@@ -9,7 +9,7 @@ import pytest
 from experts import NMPCExpert
 from experts.model import RobotModel
 from experts.nominal import nominal_motion
-from experts.phase import LAG_S, SAMPLES, TRAIL_S, PhaseScales, _cycle, fit_phase
+from experts.phase import LAG_S, SAMPLES, TRAIL_S, PhaseScales, _cycle, _residuals, fit_phase
 from experts.swing import SwingRule
 from go1_mtl_gym import GAITS, robot
 from go1_mtl_gym.env import Go1Env
@@ -144,6 +144,19 @@ def test_a_pacing_bodys_feet_are_drawn_aside_by_the_sway():
     swinging = ~gait.stance(np.arange(SAMPLES) / SAMPLES - LAG_S / gait.period)
     assert not cycle.drawn[swinging].any()
     np.testing.assert_allclose(cycle.sway.imag, motion.velocity[:, 4], atol=1e-3)
+
+
+def test_the_sway_explains_where_a_pacing_robots_feet_are(model):
+    """Sideways places at the true phase fit better with the sway than without it, and worst with it reversed."""
+    cycle, left = _cycle(GAITS["pace"], SwingRule(), HEIGHT), []
+    for state in walked("pace", (0.3, 0.0, 0.0)):
+        now = round(state.phase * SAMPLES) % SAMPLES
+        stance = state.gait.stance(state.phase)
+        for sign in (1, 0, -1):
+            residuals = _residuals(state, model, replace(cycle, drawn=sign * cycle.drawn), PhaseScales(), HEIGHT)
+            left.append(np.square(residuals[now, 16:20][stance]).sum())
+    with_sway, without, reversed_sway = np.reshape(left, (-1, 3)).mean(axis=0)
+    assert with_sway < without < reversed_sway
 
 
 def test_the_foot_is_down_when_its_arc_meets_the_ground_by_hand():
