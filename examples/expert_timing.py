@@ -24,7 +24,7 @@ MODES = {
 } | {f"whole body: {name}": NMPCConfig(whole_body=name) for name in WHOLE_BODY if name != NMPCConfig().whole_body}
 """Settings of the expert that are compared with each other, by name."""
 MPC_HZ = 100
-"""Where control is faster than this, forces are planned at this rate and the whole body is solved at every step [Hz]."""
+"""Where control is faster than this, forces are planned at this rate, the whole body at every step [Hz]."""
 MODE_TASKS = ("trot", "bound", "jump")
 """Gaits on which they are compared."""
 

@@ -27,5 +27,5 @@ HARDWARE_LIKE = MappingProxyType(
         "action_delay_s": 0.004,
     }
 )
-"""Keyword arguments of `go1_mtl_gym.Go1Env`: MPC at 100 Hz, whole body and joint targets at 500 Hz as in the paper, noise
-on sensors and on the expert's estimate of the state, and 4 ms from a target to its effect."""
+"""Keyword arguments of `go1_mtl_gym.Go1Env`: MPC at 100 Hz, whole body and joint targets at 500 Hz as in the paper,
+noise on sensors and on the expert's estimate of the state, and 4 ms from a target to its effect."""

@@ -38,7 +38,7 @@ from experts.nominal import NominalMotion, nominal_motion, standing_motion
 from experts.planar import to_complex, turn
 from experts.reference import body_reference
 from experts.swing import SwingRule
-from experts.trajectory import Recall, Trajectory
+from experts.trajectory import Frame, Recall, Trajectory
 from experts.whole_body import joint_torques
 from experts.whole_body_qp import WholeBodyQP
 from go1_mtl_gym import robot
@@ -194,39 +194,47 @@ class NMPCExpert:
         return trajectory.forces_w(state.time_s)
 
     def plan(self, state: RobotState, dynamics: Dynamics) -> Trajectory:
-        """Predict states and forces over one gait cycle; the nominal load along the reference if no solve is usable."""
+        """Predict states and forces over one gait cycle; the nominal load along the reference if no solve is usable.
+
+        The program is posed in the frame below the centre of mass that faces where the robot does, so that it is the
+        same wherever the robot is.
+        """
         config, gait = self.config, state.gait
         steps = config.mpc.steps
         dt = gait.period / steps
         motion = self.motion(state)
-        attitude = whole_body_attitude(state, dynamics)
-        reference = body_reference(state, attitude[2], dynamics.com_w, motion, config.com_height, dt, steps)
+        roll, pitch, yaw = whole_body_attitude(state, dynamics)
+        frame = Frame(dynamics.com_w, yaw)
+        com = np.array([0.0, 0.0, dynamics.com_w[2]])
+        reference = body_reference(state, 0.0, com, motion, config.com_height, dt, steps)
         middle = state.phase + (np.arange(steps) + 0.5) / steps
         contact = np.ones((steps, 4)) if state.standing else gait.contact_schedule(state.phase, dt, steps)
         velocity_w = self.mean_velocity(state, dynamics)
-        feet = config.footholds.over_horizon(state, dynamics.com_w, velocity_w, dynamics.feet_w, middle)
+        feet_w = config.footholds.over_horizon(state, dynamics.com_w, velocity_w, dynamics.feet_w, middle)
         nominal = motion.force_at(middle) * (robot.MASS * robot.GRAVITY / FORCE_UNIT)
         sideways = to_complex(nominal) * turn(reference[:-1, 2:3])
         nominal[..., 0], nominal[..., 1] = sideways.real, sideways.imag
         nominal = nominal.reshape(steps, 12)
-        x0 = np.concatenate([attitude, dynamics.com_w, dynamics.mean_omega_w, dynamics.com_velocity_w])
+        feet = frame.points(feet_w)
+        turning, moving = frame.vectors(np.stack([dynamics.mean_omega_w, dynamics.com_velocity_w]))
+        x0 = np.concatenate([(roll, pitch, 0.0), com, turning, moving])
         inertia_b = state.rotation.T @ dynamics.inertia_w @ state.rotation
 
         states, inputs = reference, nominal
         earlier = self._recall.before(state) if config.linearisation == "shifted" else None
         if earlier is not None:
-            states, inputs = earlier.shifted(state.time_s, reference, nominal)
+            states, inputs = earlier.shifted(state.time_s, frame, reference, nominal)
         for _ in range(config.sqp_iterations):
             model = linearise(states, inputs, feet, inertia_b, dt)
             solution = self._mpc.solve(model, x0, reference[1:], nominal, contact)
             self.counters.count(solution)
             if not solution.usable:
-                return Trajectory(state.time_s, gait, dt, reference, nominal)
+                return Trajectory(state.time_s, gait, dt, reference, nominal, frame)
             before, states, inputs = states, np.vstack([x0, solution.states]), solution.inputs
             moved = np.abs(states - before)
             if max(moved[:, RPY].max(), moved[:, COM].max() / config.com_height) < config.sqp_tolerance:
                 break
-        return Trajectory(state.time_s, gait, dt, states, inputs)
+        return Trajectory(state.time_s, gait, dt, states, inputs, frame)
 
     def mean_velocity(self, state: RobotState, dynamics: Dynamics) -> np.ndarray:
         """Horizontal velocity of the centre of mass without the gait's own sway, world [m/s], shape (2,)."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from experts.dynamics import FORCE_UNIT
-from experts.trajectory import Recall, Trajectory
+from experts.trajectory import WORLD, Frame, Recall, Trajectory
 from go1_mtl_gym import GAITS
 
 TROT, DT = GAITS["trot"], 0.025
@@ -31,14 +31,14 @@ def ramp(time_s: float = 1.0, gait=TROT) -> Trajectory:
     ],
 )
 def test_shifting_by_hand(intervals, states, inputs):
-    x, u = ramp().shifted(1.0 + intervals * DT, REFERENCE, NOMINAL)
+    x, u = ramp().shifted(1.0 + intervals * DT, WORLD, REFERENCE, NOMINAL)
     np.testing.assert_allclose(x, np.tile(np.array(states, float)[:, None], (1, 12)), atol=1e-9)
     np.testing.assert_allclose(u, np.tile(np.array(inputs, float)[:, None], (1, 12)), atol=1e-9)
 
 
 def test_shifting_leaves_the_trajectory_and_the_reference_alone():
     trajectory = ramp()
-    trajectory.shifted(1.05, REFERENCE, NOMINAL)
+    trajectory.shifted(1.05, WORLD, REFERENCE, NOMINAL)
     np.testing.assert_array_equal(trajectory.states, ramp().states)
     assert (REFERENCE == -1).all() and (NOMINAL == -2).all()
 
@@ -80,3 +80,22 @@ def test_a_plan_is_held_for_a_period(standing):
     recall.store(plan)
     for time_s, held in ((1.0, True), (1.01, True), (1.019, True), (1.02, False), (1.5, False), (0.99, False)):
         assert (recall.at(at(standing, time_s), 0.02) is plan) == held, time_s
+
+
+def test_a_frame_turns_there_and_back():
+    here, there = Frame(np.array([3.0, -2.0, 0.3]), 3.0), Frame(np.array([-1.0, 4.0, 0.2]), -3.0)
+    states = np.random.default_rng(0).normal(size=(5, 12))
+    np.testing.assert_allclose(here.states(there.states(states, here), there), states, atol=1e-12)
+    moved = there.states(states, here)
+    np.testing.assert_allclose(moved[:, 2] - states[:, 2], 6.0 - 2 * np.pi, atol=1e-12)
+    world = states[:, 3:6] @ here.rotation.T + here.origin_w
+    np.testing.assert_allclose(there.points(world), moved[:, 3:6], atol=1e-12)
+
+
+def test_a_trajectory_seen_from_elsewhere_is_the_same_in_the_world():
+    plan = ramp()
+    frame = Frame(np.array([1.0, 2.0, 0.0]), 0.7)
+    states, inputs = plan.shifted(1.0, frame, REFERENCE, NOMINAL)
+    np.testing.assert_allclose(WORLD.states(states, frame)[:-1], plan.states[:-1], atol=1e-12)
+    seen = Trajectory(1.0, plan.gait, plan.dt, states, inputs, frame)
+    np.testing.assert_allclose(seen.forces_w(1.0), plan.forces_w(1.0), atol=1e-12)
