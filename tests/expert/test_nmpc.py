@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from experts import MPCConfig, NMPCConfig, NMPCExpert
+from experts import NMPCConfig, NMPCExpert
 from experts.dynamics import FORCE_UNIT
 from experts.mpc import Solution
 from go1_mtl_gym import robot
