@@ -10,10 +10,10 @@ from go1_mtl_gym import TASKS
 from trainers.environments import derive_seed
 
 AXES = {
-    "vx": (0, (1.0,), 0.1, 2.5),
-    "-vx": (0, (-1.0,), 0.1, 2.5),
+    "vx": (0, (1.0,), 0.2, 2.5),
+    "-vx": (0, (-1.0,), 0.2, 2.5),
     "vy": (1, (1.0, -1.0), 0.1, 1.0),
-    "yaw": (2, (1.0, -1.0), 0.25, 3.0),
+    "yaw": (2, (1.0, -1.0), 0.5, 3.0),
 }
 """Axis -> its place in the command, the signs tried in turn, step of the grid and largest figure [m/s, rad/s]."""
 OTHERS = (0.3, 0.1, 0.2)

@@ -25,7 +25,7 @@ MODES = {
 """Settings of the expert that are compared with each other, by name."""
 MPC_HZ = 100
 """Where control is faster than this, forces are planned at this rate, the whole body at every step [Hz]."""
-MODE_TASKS = ("trot", "bound", "jump")
+MODE_TASKS = ("trot", "jump")
 """Gaits on which they are compared."""
 
 

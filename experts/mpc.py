@@ -45,7 +45,7 @@ class MPCConfig:
     """
 
     steps: int = 16
-    state_weight: tuple[float, ...] = (20.0, 20.0, 10.0, 10.0, 10.0, 60.0, 0.4, 0.4, 0.4, 20.0, 20.0, 2.0)
+    state_weight: tuple[float, ...] = (20.0, 20.0, 10.0, 10.0, 10.0, 60.0, 0.4, 0.4, 0.4, 12.0, 12.0, 2.0)
     input_weight: float = 0.4
     friction: float = 0.5
     max_force: float = 160.0
