@@ -97,6 +97,7 @@ def expert_section(expert: Mapping[str, Any], made_by: str, pictures: Sequence[s
         ("Kicks", "pushes", push_table, "pushes"),
         ("Steady walking", "steady", steady_table, "contacts"),
         ("Changes of gait", "transitions", None, "transitions"),
+        ("Labels", "labels", labels_table, None),
         ("Settings compared", "modes", modes_table, None),
         ("Time", "timing", timing_table, None),
         ("The long walk", "soak", soak_table, None),
@@ -164,6 +165,17 @@ def steady_table(expert: Mapping[str, Any]) -> str:
     return markdown(header, rows, text_columns=3)
 
 
+def labels_table(expert: Mapping[str, Any]) -> str:
+    """What the expert's answers depend on."""
+    rows = []
+    for gait, own in expert["report"]["labels"].items():
+        phase = [f"{own['phase_error'][name]:.3f}" for name in ("median", "p95")]
+        clocks = [f"{own[name]:.3f}" for name in ("wrong_clock", "fitted_clock")]
+        rows.append([gait, str(own["states"]), str(own["asked_again"]), f"{own['displaced']:.0e}", *clocks, *phase])
+    header = ["gait", "states", "other bits when asked again", "moved and turned [rad]", "clock wrong by 1/4 [rad]"]
+    return markdown([*header, "then fitted [rad]", "error of the fitted clock [cycles]", "95 %"], rows)
+
+
 def modes_table(expert: Mapping[str, Any]) -> str:
     """What other settings of the expert buy and cost."""
     rows = []
@@ -200,7 +212,7 @@ def totals_text(totals: Mapping[str, Any]) -> str:
     """Control steps of all sections, and what went wrong in them."""
     return (
         f"All sections together: {totals['calls']} control steps, {totals['bad_actions']} actions that were not "
-        f"finite, {totals['unhandled']} exceptions, {totals['solver_failures']} solves that fell back to the last "
+        f"finite, {totals['unhandled']} exceptions, {totals['solver_failures']} solves that fell back to the nominal "
         f"forces, {totals['inexact_solves']} inexact ones, {totals['bad_states']} states refused. The bar, "
         f"{totals['wanted']} steps without a NaN and without an exception, is "
         f"{'passed' if totals['passed'] else '**missed**'}."

@@ -11,6 +11,7 @@ from typing import Any
 
 import joblib
 from expert_lab import Lab
+from expert_labels import LabelsConfig, labels
 from expert_limits import LimitsConfig, PushConfig, limits, pushes
 from expert_steady import SteadyConfig, steady
 from expert_timing import MODE_TASKS, ModesConfig, TimingConfig, modes, timing
@@ -49,6 +50,7 @@ SECTIONS = {
     "transitions": Section(transitions, TransitionConfig()),
     "soak": Section(soak, SoakConfig()),
     "steady": Section(steady, SteadyConfig()),
+    "labels": Section(labels, LabelsConfig()),
     "modes": Section(modes, ModesConfig(), tasks=MODE_TASKS),
     "timing": Section(timing, TimingConfig(), alone=True),
 }
@@ -60,6 +62,7 @@ QUICK = {
     "transitions": {"trials": 1, "after_s": 1.0},
     "soak": {"steps": 200},
     "steady": {"seconds": 4.0},
+    "labels": {"walks": 1, "seconds": 1.5},
     "modes": {"episodes": 1, "seconds": 3.0, "push": PushConfig(1, grid=0, after_s=0.5, directions=("left",))},
     "timing": {"states": 20, "blocks": 1, "block_s": 0.2},
 }

@@ -1,0 +1,100 @@
+"""What the expert's answers depend on: not on place or heading or what was asked before, but on the gait clock."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from expert_lab import Lab, generator
+
+from experts import NMPCExpert
+from experts.model import RobotModel
+from experts.phase import fit_phase
+from go1_mtl_gym import TASKS
+from go1_mtl_gym.state import RobotState
+
+
+@dataclass(frozen=True)
+class LabelsConfig:
+    """States along walks at drawn commands, at which labels are compared.
+
+    Attributes:
+        walks: per gait.
+        seconds: duration of each; the first does not count [s].
+        every: control steps between two states.
+        shift: by how much the gait clock is put wrong [cycles].
+        distance: how far robots are displaced at most [m].
+    """
+
+    walks: int = 5
+    seconds: float = 6.0
+    every: int = 5
+    shift: float = 0.25
+    distance: float = 100.0
+
+
+def labels(lab: Lab, task: str, config: LabelsConfig, seed: int) -> dict[str, Any]:
+    """Differences between joint targets [rad] and errors of the fitted clock [cycles].
+
+    Returns:
+        "displaced": largest difference when robots stand and face elsewhere; "asked_again": how many of the states got
+        other bits from an expert that was asked in the opposite order; "wrong_clock": median over states of the mean
+        difference per joint when the clock is shifted; "fitted_clock": the same when the clock was then fitted from the
+        robot's motion; "phase_error": median and 95th percentile of that fit's error.
+    """
+    states = _states(lab, task, config, seed)
+    rng, model = generator("labels", task, seed), RobotModel()
+    asked, backwards = NMPCExpert(), NMPCExpert()
+    answers = np.array([asked.action(state) for state in states])
+    again = np.array([backwards.action(state) for state in reversed(states)])[::-1]
+    displaced = [asked.action(_displaced(state, rng, config.distance)) for state in states]
+    shifted = [replace(state, phase=(state.phase + config.shift) % 1.0) for state in states]
+    fitted = [replace(state, phase=fit_phase(state, model).phase) for state in shifted]
+    errors = np.array([abs((now.phase - then.phase + 0.5) % 1.0 - 0.5) for now, then in zip(fitted, states)])
+
+    def off(others: list[RobotState]) -> float:
+        return float(np.median(np.abs(np.array([asked.action(state) for state in others]) - answers).mean(axis=1)))
+
+    lab.ledger.add(lab.settle())
+    return {
+        "states": len(states),
+        "displaced": float(np.abs(np.array(displaced) - answers).max()),
+        "asked_again": int((again != answers).any(axis=1).sum()),
+        "wrong_clock": off(shifted),
+        "fitted_clock": off(fitted),
+        "phase_error": {"median": float(np.median(errors)), "p95": float(np.quantile(errors, 0.95))},
+    }
+
+
+def _states(lab: Lab, task: str, config: LabelsConfig, seed: int) -> list[RobotState]:
+    """States of a moving robot, from the second second of each walk."""
+    states = []
+    for i in range(config.walks):
+        rng = generator("labels", task, seed, i)
+        lab.begin(task, rng.uniform(-1, 1, 3) * np.array(TASKS[task].command_range), "labels", seed, i)
+        for step in range(round(config.seconds * lab.env.control_hz)):
+            if step >= lab.env.control_hz and step % config.every == 0:
+                states.append(lab.env.state)
+            if lab.step()["fallen"]:
+                break
+    return states
+
+
+def _displaced(state: RobotState, rng: np.random.Generator, distance: float) -> RobotState:
+    """The same robot somewhere else, facing another way."""
+    yaw = rng.uniform(-np.pi, np.pi)
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    w, x, y, z = state.quat_wxyz
+    half_cos, half_sin = np.cos(yaw / 2), np.sin(yaw / 2)
+    quat = [
+        half_cos * w - half_sin * z,
+        half_cos * x - half_sin * y,
+        half_cos * y + half_sin * x,
+        half_cos * z + half_sin * w,
+    ]
+    return replace(
+        state,
+        position_w=turn @ state.position_w + np.array([*rng.uniform(-distance, distance, 2), 0.0]),
+        quat_wxyz=np.array(quat),
+        linear_velocity_w=turn @ state.linear_velocity_w,
+    )
