@@ -145,13 +145,15 @@ class _Workspace:
 
 
 class PIQPSolver:
-    """Proximal interior point on the sparse program, to 1e-8 (R. Schwan et al., 2023)."""
+    """Proximal interior point on the sparse program, to 1e-10 (R. Schwan et al., 2023)."""
 
     def __init__(self, program: "QuadraticProgram") -> None:
         piqp = _optional("piqp")
         self._done = piqp.PIQP_SOLVED
         self._split = program.config.steps * 12
         self._solver = piqp.SparseSolver()
+        self._solver.settings.eps_abs = self._solver.settings.eps_rel = 1e-10
+        self._solver.settings.eps_duality_gap_abs = self._solver.settings.eps_duality_gap_rel = 1e-10
         self._solver.settings.preconditioner_reuse_on_update = True  # equal bits: see `solve`
         self._P = sparse.csc_matrix(program.P)
         self._solver.setup(self._P, program.q, *self._constraints(program))
