@@ -21,7 +21,8 @@ class Task:
         name: the task's name, which is also its gait's in the built-in tasks.
         gait: the contact plan.
         command_range: largest |vx|, |vy| [m/s] and |yaw rate| [rad/s] that are drawn at random.
-        command_limit: largest |vx|, |vy|, |yaw rate| that the environment accepts.
+        command_limit: largest |vx|, |vy|, |yaw rate| that the environment accepts; of the built-in tasks, the largest
+            along each axis that the expert survived in 20 of 20 episodes (docs/results/expert.json, "limits").
         reward: weights of the reward terms.
 
     Raises:
@@ -70,12 +71,12 @@ class Task:
 _REGISTRY = {
     task.name: task
     for task in (
-        Task("trot", GAITS["trot"], command_range=(0.8, 0.3, 0.5)),
-        Task("bound", GAITS["bound"], command_range=(0.5, 0.3, 0.5)),
-        Task("jump", GAITS["jump"], command_range=(0.5, 0.3, 0.5)),
-        Task("walk", GAITS["walk"], command_range=(0.5, 0.3, 0.5)),
-        Task("pace", GAITS["pace"], command_range=(0.5, 0.2, 0.5)),
-        Task("gallop", GAITS["gallop"], command_range=(0.5, 0.2, 0.5)),
+        Task("trot", GAITS["trot"], command_range=(0.8, 0.3, 0.5), command_limit=(2.0, 1.0, 3.0)),
+        Task("bound", GAITS["bound"], command_range=(0.5, 0.3, 0.5), command_limit=(2.1, 1.0, 3.0)),
+        Task("jump", GAITS["jump"], command_range=(0.5, 0.3, 0.5), command_limit=(1.7, 0.6, 3.0)),
+        Task("walk", GAITS["walk"], command_range=(0.5, 0.3, 0.5), command_limit=(1.1, 0.9, 2.5)),
+        Task("pace", GAITS["pace"], command_range=(0.5, 0.2, 0.5), command_limit=(2.5, 1.0, 3.0)),
+        Task("gallop", GAITS["gallop"], command_range=(0.5, 0.2, 0.5), command_limit=(2.5, 1.0, 3.0)),
     )
 }
 TASKS = MappingProxyType(_REGISTRY)
