@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from expert_bars import LABELS, NOTE, PROTOTYPE, compare, measured
+from expert_timing import MPC_HZ
 
 from trainers.report import closed_loop_table, markdown
 
@@ -198,7 +199,8 @@ def timing_table(expert: Mapping[str, Any]) -> str:
             factors = [f"{found[name]:.1f}" for name in ("expert", "environment", "physics")]
             rows.append([gait, f"{rate} Hz", *times, *factors, f"{found['expert_to_physics']:.3f}"])
     header = ["gait", "control", "MPC update [ms]", "p99", "action [ms]", "p99", "expert x real time"]
-    return markdown([*header, "environment x", "MuJoCo x", "expert / MuJoCo"], rows, text_columns=2)
+    table = markdown([*header, "environment x", "MuJoCo x", "expert / MuJoCo"], rows, text_columns=2)
+    return f"{table}\n\nWhere control is faster than {MPC_HZ} Hz, forces are planned at that rate."
 
 
 def soak_table(expert: Mapping[str, Any]) -> str:

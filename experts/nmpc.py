@@ -51,7 +51,7 @@ WHOLE_BODY = {
     "qp": lambda: WholeBodyQP().torques,
     "jacobian_transpose": lambda: jacobian_transpose_torques,
 }
-"""Ways from forces to torques by name; the first is the default, since it did best (docs/results)."""
+"""Ways from forces to torques by name; the first, the default, tracks best for its time (docs/results)."""
 SHORTEST_PIECE_S = 1e-3
 """Contact changes closer than this to each other or to the ends of a hold are taken as one [s]."""
 
