@@ -76,11 +76,14 @@ class Episode:
             self.estimator_error.advance()
 
     def change_task(self, task: Task, phase: float | None) -> None:
-        """Change the task: at once to a phase, or with None to phase 0 as soon as the present gait can be left."""
-        if phase is None and self.task.gait.change_phase is not None and task != self.task:
-            self.next_task = task
-        else:
+        """Change the task: at once to a phase, or with None to phase 0 as soon as the present gait can be left.
+
+        With None, a task that is present already goes on as it is.
+        """
+        if phase is not None or (task != self.task and self.task.gait.change_phase is None):
             self.task, self.phase, self.next_task = task, phase or 0.0, None
+        else:
+            self.next_task = None if task == self.task else task
 
     def estimated(self, state: RobotState) -> RobotState:
         """What the state estimator makes of the true state, now."""

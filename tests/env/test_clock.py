@@ -148,3 +148,12 @@ def test_a_gait_that_rests_is_left_at_once():
     env.reset(seed=0, options={"command": (0.0, 0.0, 0.0)})
     env.set_task("trot")
     assert env.step(home(env))[4]["task"] == "trot"
+
+
+def test_asking_for_the_present_task_leaves_its_clock_alone():
+    env = Go1Env("trot")
+    env.reset(seed=0, options={"command": (0.3, 0.0, 0.0)})
+    for _ in range(4):
+        *_, info = env.step(home(env))
+        env.set_task("trot")
+    assert env.state.phase == info["phase"] == pytest.approx(3 * 0.02 / 0.4)
