@@ -52,6 +52,10 @@ class Task:
         """A uniform draw of (vx, vy, yaw rate) from the task's range, shape (3,)."""
         return rng.uniform(-1.0, 1.0, 3) * np.array(self.command_range)
 
+    def draw_corner(self, rng: np.random.Generator) -> np.ndarray:
+        """A uniform draw among the corners of the task's range: each of (vx, vy, yaw rate) at + or - its largest."""
+        return rng.choice((-1.0, 1.0), 3) * np.array(self.command_range)
+
     def check_command(self, command: object) -> np.ndarray:
         """Return a command as a vector (vx [m/s], vy [m/s], yaw rate [rad/s]).
 

@@ -29,6 +29,15 @@ def test_drawn_commands_fill_the_range_and_stay_within_it(task):
 
 
 @EVERY
+def test_drawn_corners_are_all_eight_and_nothing_else(task):
+    rng = np.random.default_rng(0)
+    corners = np.array([task.draw_corner(rng) for _ in range(800)])
+    assert (np.abs(corners) == task.command_range).all()
+    different, count = np.unique(corners, axis=0, return_counts=True)
+    assert len(different) == 8 and count.min() > 60, "each is drawn about 100 times"
+
+
+@EVERY
 def test_draws_depend_on_the_generator_alone(task):
     draws = [task.draw_command(np.random.default_rng(5)) for _ in range(2)]
     np.testing.assert_array_equal(*draws)
