@@ -88,6 +88,7 @@ class ObservationLayout:
     Attributes:
         slices: part name -> slice of the observation.
         size: length of the observation.
+        tasks, channels, history: as given, the channels in the order of their table.
         n_tasks: K.
         low, high: bounds, float32, shape (size,).
 
@@ -106,7 +107,8 @@ class ObservationLayout:
             raise InvalidInputError(f"history must be an integer from 1 to 50, got {history!r}")
         self.channels = tuple(name for name in CHANNELS if name in channels)
         self.history = int(history)
-        self.n_tasks = len(tasks)
+        self.tasks = tuple(tasks)
+        self.n_tasks = len(self.tasks)
         sizes = dict(PROPRIOCEPTION) | {name: CHANNELS[name] for name in self.channels}
         if self.history > 1:
             sizes["history"] = FRAME_SIZE * (self.history - 1)
@@ -130,6 +132,28 @@ class ObservationLayout:
             for bound in (low, high):
                 bound[self.slices["history"]] = np.tile(bound[:FRAME_SIZE], self.history - 1)
         return low.astype(np.float32), high.astype(np.float32)
+
+    def columns(self, other: "ObservationLayout") -> np.ndarray:
+        """Where the entries of a smaller observation stand in this one: ``observation[columns]`` is the smaller one.
+
+        Args:
+            other: a layout with the same tasks, with no channel that is not here, and with no more frames.
+
+        Returns:
+            int, shape (other.size,).
+
+        Raises:
+            InvalidInputError: if the other layout has something that is not here, or other tasks.
+        """
+        if other.tasks != self.tasks:
+            raise InvalidInputError(f"both layouts must have the tasks {self.tasks}, the other one has {other.tasks}")
+        missing = [name for name in other.channels if name not in self.channels]
+        if missing:
+            raise InvalidInputError(f"the other layout's channels must be among {self.channels}, got also {missing}")
+        if other.history > self.history:
+            raise InvalidInputError(f"the other layout's history must be at most {self.history}, got {other.history}")
+        first = {name: self.slices[name].start for name in other.slices}
+        return np.concatenate([np.arange(w.stop - w.start) + first[name] for name, w in other.slices.items()])
 
     def flatten(self, parts: Mapping[str, np.ndarray], older_frames: Sequence[np.ndarray], task: int) -> np.ndarray:
         """The observation, clipped to its bounds as a saturating sensor would.

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.observation import FRAME_SIZE
+from go1_mtl_gym.observation import FRAME_SIZE, ObservationLayout
 from trainers.files import write_atomically
 
 if TYPE_CHECKING:
@@ -104,8 +104,41 @@ class Demonstrations:
 
     def proprioceptive(self) -> "Demonstrations":
         """The same rows as seen without channels and history: the first 34 numbers and the task id."""
-        obs = np.concatenate([self.obs[:, :FRAME_SIZE], self.obs[:, -len(self.tasks) :]], axis=1)
-        return dataclasses.replace(self, obs=obs)
+        size = self.obs.shape[1]
+        return self.take_columns(np.r_[:FRAME_SIZE, size - len(self.tasks) : size])
+
+    def select(self, have: ObservationLayout, want: ObservationLayout) -> "Demonstrations":
+        """The same rows as seen with fewer channels or a shorter history.
+
+        Args:
+            have: the layout of these rows.
+            want: the layout to see them in; it holds nothing that `have` does not.
+
+        Raises:
+            InvalidInputError: if `have` is not the layout of these rows, or `want` has something that `have` has not.
+        """
+        if (have.size, have.tasks) != (self.obs.shape[1], self.tasks):
+            raise InvalidInputError(
+                f"the layout of these rows must have {self.obs.shape[1]} entries and the tasks {self.tasks}, "
+                f"got {have.size} and {have.tasks}"
+            )
+        return self.take_columns(have.columns(want))
+
+    def take_columns(self, columns: np.ndarray) -> "Demonstrations":
+        """The same rows with a selection of the observation's entries.
+
+        Args:
+            columns: their indices, the task id last and whole, int, shape (size of the new observation,).
+
+        Raises:
+            InvalidInputError: if an index is outside [0, D), or the last ones are not the task id's.
+        """
+        columns, size, k = np.asarray(columns), self.obs.shape[1], len(self.tasks)
+        if columns.ndim != 1 or columns.dtype.kind not in "iu" or (columns < 0).any() or (columns >= size).any():
+            raise InvalidInputError(f"columns must be a vector of indices from 0 to {size - 1}, got {columns.tolist()}")
+        if columns[-k:].tolist() != list(range(size - k, size)):
+            raise InvalidInputError(f"columns must end in the task id's, {size - k} ... {size - 1}, got {columns[-k:]}")
+        return dataclasses.replace(self, obs=self.obs[:, columns])
 
     def split(self, fraction: float, seed: int) -> tuple["Demonstrations", "Demonstrations"]:
         """Training and held-out rows; whole episodes are held out, at least one per task.

@@ -63,6 +63,38 @@ def test_parts_that_were_not_asked_for_are_left_out():
     assert len(flat) == 34 + 2 + 4
 
 
+@pytest.mark.parametrize(
+    ("channels", "history"), [((), 1), (("phase",), 2), (("last_action", "command"), 3), (ALL, 1), (ALL, 4)]
+)
+def test_columns_see_the_same_state_in_a_smaller_layout(channels, history):
+    rng = np.random.default_rng(5)
+    values, older = parts(rng), list(rng.uniform(0, 1, (3, 34)))
+    large, small = ObservationLayout(TASKS, ALL, history=4), ObservationLayout(TASKS, channels, history)
+    columns = large.columns(small)
+    assert columns.shape == (small.size,) and columns.dtype.kind == "i"
+    seen = large.flatten(values, older, task=3)[columns]
+    np.testing.assert_array_equal(seen, small.flatten(values, older[: history - 1], task=3))
+
+
+def test_columns_by_hand():
+    have, want = ObservationLayout(TASKS, ("command", "phase"), 2), ObservationLayout(TASKS, ("phase",))
+    assert have.columns(want).tolist() == [*range(34), 37, 38, *range(73, 77)]
+    assert have.columns(have).tolist() == list(range(77))
+
+
+@pytest.mark.parametrize(
+    ("other", "words"),
+    [
+        (ObservationLayout(TASKS, ("phase", "gravity"), 2), "'phase',.*got also .'gravity'"),
+        (ObservationLayout(TASKS, (), 3), "history must be at most 2, got 3"),
+        (ObservationLayout(TASKS[::-1]), "tasks.*'trot'.*has.*'walk'"),
+    ],
+)
+def test_columns_of_what_is_not_there(other, words):
+    with pytest.raises(InvalidInputError, match=words):
+        ObservationLayout(TASKS, ("phase",), 2).columns(other)
+
+
 def test_values_saturate_at_the_documented_bounds():
     layout = ObservationLayout(TASKS, ALL, history=2)
     huge = {name: np.full_like(value, 1e6) for name, value in parts(np.random.default_rng(2)).items()}

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.observation import ObservationLayout
 from trainers import Demonstrations
 
 
@@ -48,6 +49,41 @@ def test_concatenate_keeps_what_is_agreed():
         Demonstrations.concatenate([tiny(), tiny(half_range=np.array([1.0, 2.5]))])
     with pytest.raises(InvalidInputError, match="empty"):
         Demonstrations.concatenate([])
+
+
+def wide(layout: ObservationLayout, n: int = 3) -> Demonstrations:
+    """Rows whose entry j is j + 1000 times the row, but for the task ids: 0, 1, 0, ..."""
+    obs = np.arange(layout.size) + 1000.0 * np.arange(n)[:, None]
+    obs[:, -2:] = np.eye(2)[np.arange(n) % 2]
+    return tiny(obs=obs, acts=np.zeros((n, 2)), starts=np.ones(n, dtype=bool))
+
+
+def test_select_what_a_smaller_layout_sees():
+    have = ObservationLayout(("trot", "bound"), ("command", "phase"), history=3)
+    rows = wide(have)
+    seen = rows.select(have, ObservationLayout(rows.tasks, ("phase",), history=2))
+    assert seen.obs[1].tolist() == [*range(1000, 1034), 1037, 1038, *range(1039, 1073), 0, 1]
+    assert seen.task.tolist() == rows.task.tolist() and seen.meta == rows.meta
+    np.testing.assert_array_equal(rows.select(have, have).obs, rows.obs)
+    literal = rows.select(have, ObservationLayout(rows.tasks))
+    np.testing.assert_array_equal(literal.obs, rows.proprioceptive().obs)
+    assert literal.obs[2].tolist() == [*range(2000, 2034), 1, 0]
+
+
+def test_select_from_another_layout():
+    have = ObservationLayout(("trot", "bound"), ("phase",))
+    for wrong in (ObservationLayout(have.tasks), ObservationLayout(("bound", "trot"), ("phase",))):
+        with pytest.raises(InvalidInputError, match="layout of these rows must have 38 entries"):
+            wide(have).select(wrong, wrong)
+    with pytest.raises(InvalidInputError, match="got also"):
+        wide(have).select(have, ObservationLayout(have.tasks, ("command",)))
+
+
+@pytest.mark.parametrize("columns", [[0, 2], [4, 2, 3], [-1, 2, 3], [[2, 3]], [0.0, 2.0, 3.0], [0, 3, 2], []])
+def test_impossible_columns(columns):
+    assert tiny().take_columns([1, 2, 3]).obs[2].tolist() == [4, 1, 0]
+    with pytest.raises(InvalidInputError, match="columns must"):
+        tiny().take_columns(columns)
 
 
 def test_split_holds_out_whole_episodes_of_every_task():
