@@ -123,6 +123,7 @@ class BCTrainer(imitation_bc.BC):
         progress: bool = False,
         on_batch_end: Callable[[], None] | None = None,
         seed: int | None = None,
+        weights: np.ndarray | None = None,
     ) -> BCHistory:
         """Run the whole schedule once on a data set, starting from the present weights.
 
@@ -132,15 +133,17 @@ class BCTrainer(imitation_bc.BC):
             progress: show a bar.
             on_batch_end: called after every gradient step.
             seed: of the order of the rows; None takes the configuration's.
+            weights: how often each row is drawn per pass, positive integers, shape (n,); None draws each once.
 
         Raises:
+            InvalidInputError: if the weights are not as described.
             TrainingDivergedError: if the loss is no longer finite.
         """
         config, policy = self.config, self.policy
         batch_size = min(config.batch_size, len(dataset))
         self.batch_size = self.minibatch_size = batch_size
         seed = config.seed if seed is None else seed
-        self.set_demonstrations(TensorBatches(dataset, batch_size, seed, policy.device))
+        self.set_demonstrations(TensorBatches(dataset, batch_size, seed, policy.device, weights))
         self.loss_calculator = losses.MultiTaskLoss(dataset.tasks, dataset.half_range, config.space)
         self.optimizer, schedule = _optimizer(policy, config)
         average = _Average(policy.actor, config.ema_decay) if config.ema_decay else None

@@ -43,6 +43,36 @@ def test_batches_differ_between_passes_and_repeat_for_a_seed(demos):
     assert not torch.equal(next(iter(one))["acts"], first)
 
 
+def test_rows_are_drawn_as_often_as_they_weigh(demos):
+    few = demos.take(np.concatenate([np.flatnonzero(demos.task == k)[:12] for k in range(4)]))
+    weights = np.where(np.arange(48) % 12 < 4, 3, 1)  # per task: 4 rows of weight 3 and 8 of weight 1 are 20 draws
+    batches = TensorBatches(few, 16, seed=0, weights=weights)
+    drawn = [batch["obs"] for _ in range(5) for batch in batches]  # 15 batches of 4 rows per task: 3 passes
+    rows = {tuple(row): i for i, row in enumerate(few.obs.tolist())}
+    count = np.bincount([rows[tuple(row)] for batch in drawn for row in batch.tolist()], minlength=48)
+    assert count.tolist() == (3 * weights).tolist()
+
+
+def test_weights_of_one_change_nothing(demos):
+    plain, weighted = TensorBatches(demos, 64, seed=5), TensorBatches(demos, 64, 5, weights=np.ones(len(demos), int))
+    assert all(torch.equal(a["obs"], b["obs"]) for a, b in zip(plain, weighted))
+
+
+def test_cloning_by_weights(demos):
+    weights = np.where(demos.acts[:, 0] > 0, 9, 1)
+    policies = [student() for _ in range(3)]
+    for policy, chosen in zip(policies, (None, np.ones(len(demos), int), weights)):
+        BCTrainer(policy, BCConfig(steps=20, batch_size=64)).fit(demos, weights=chosen)
+    first = [next(policy.actor.parameters()) for policy in policies]
+    assert torch.equal(first[0], first[1]) and not torch.equal(first[0], first[2])
+
+
+@pytest.mark.parametrize("change", [lambda w: w[1:], lambda w: w * 0.5, lambda w: w * 0, lambda w: w[:, None]])
+def test_bad_weights(demos, change):
+    with pytest.raises(InvalidInputError, match="weights must be"):
+        TensorBatches(demos, 64, seed=0, weights=change(np.ones(len(demos), int)))
+
+
 def test_batch_larger_than_the_data(demos):
     with pytest.raises(InvalidInputError, match="batch_size"):
         TensorBatches(demos, len(demos) + 1, seed=0)
