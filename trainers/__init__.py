@@ -16,14 +16,17 @@ if TYPE_CHECKING:
     from trainers.dagger import DAggerConfig, DAggerTrainer
     from trainers.dataset import Demonstrations
     from trainers.environments import PerturbationConfig, make_env, make_venv
-    from trainers.evaluation import ClosedLoopResult, EpisodeRecord, evaluate
+    from trainers.evaluation import evaluate
     from trainers.expert_policy import ExpertPolicy
     from trainers.figures import joint_target_figure
+    from trainers.learner import Learner
     from trainers.losses import MultiTaskLoss
     from trainers.metrics import offline_metrics
     from trainers.policy import MultiHeadPolicy
     from trainers.recording import record_frames, save_gif, tile
     from trainers.report import paper_table, results_table
+    from trainers.scoring import ClosedLoopResult, EpisodeRecord
+    from trainers.switching import evaluate_switch
     from trainers.tensorboard import log_figure, log_round, log_text, make_logger
 
 _HOME = {
@@ -32,13 +35,14 @@ _HOME = {
     "BCTrainer": "bc",
     "BlockCollector": "collector",
     "CheckpointError": "checkpoint",
-    "ClosedLoopResult": "evaluation",
+    "ClosedLoopResult": "scoring",
     "CollectJob": "collection",
     "DAggerConfig": "dagger",
     "DAggerTrainer": "dagger",
     "Demonstrations": "dataset",
-    "EpisodeRecord": "evaluation",
+    "EpisodeRecord": "scoring",
     "ExpertPolicy": "expert_policy",
+    "Learner": "learner",
     "MultiHeadPolicy": "policy",
     "MultiTaskLoss": "losses",
     "PerturbationConfig": "environments",
@@ -47,6 +51,7 @@ _HOME = {
     "collect": "collection",
     "collect_all": "collection",
     "evaluate": "evaluation",
+    "evaluate_switch": "switching",
     "joint_target_figure": "figures",
     "load": "checkpoint",
     "log_figure": "tensorboard",
@@ -77,6 +82,7 @@ __all__ = [
     "Demonstrations",
     "EpisodeRecord",
     "ExpertPolicy",
+    "Learner",
     "MultiHeadPolicy",
     "MultiTaskLoss",
     "PerturbationConfig",
@@ -85,6 +91,7 @@ __all__ = [
     "collect",
     "collect_all",
     "evaluate",
+    "evaluate_switch",
     "joint_target_figure",
     "load",
     "log_figure",

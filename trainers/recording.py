@@ -11,8 +11,8 @@ from threadpoolctl import threadpool_limits
 
 from go1_mtl_gym.errors import InvalidInputError
 from trainers.environments import make_env
-from trainers.evaluation import begin, controller
 from trainers.files import write_atomically
+from trainers.rollout import begin, controller
 
 COLOURS = 128
 """Entries of the palette that all frames of a GIF share."""

@@ -83,6 +83,10 @@ class StubEnv(gymnasium.Env):
     def set_command(self, command) -> None:
         self.command = np.array(command, dtype=float)
 
+    def set_task(self, task: str) -> None:
+        assert task in self.tasks
+        self.task, self.phase = TASKS[task], 0.0
+
     def push(self, delta_velocity_w) -> None:
         self.q[KNEES] += 0.1 * delta_velocity_w[0]
 

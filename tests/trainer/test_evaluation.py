@@ -175,6 +175,41 @@ def test_given_and_redrawn_commands():
     assert [len(e.commands) for e in result.episodes] == [3, 3] and result.success_rate == 1.0
 
 
+def test_commands_from_corners():
+    corners = SHORT | {"episodes": 6, "seconds": 2.0, "corners": True, "command_interval": 0.5}
+    result = evaluate(Scripted(), **corners)
+    given = np.array([e.commands for e in result.episodes])
+    assert given.shape == (6, 4, 3)
+    assert (np.abs(given) == TASKS["trot"].command_range).all()
+    assert len(np.unique(given[:, 0], axis=0)) > 1 and len(np.unique(given[0], axis=0)) > 1
+    again = evaluate(Scripted(spoil=still), **corners | {"episodes": 1})
+    assert again.episodes[0].commands == result.episodes[0].commands
+    with pytest.raises(InvalidInputError, match="corners"):
+        evaluate(Scripted(), **corners, commands=[(0.3, 0.0, 0.0)])
+
+
+class Remembering(Scripted):
+    """Counts the steps of an episode in a state, as a recurrent policy of stable-baselines3 would keep it."""
+
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.counts, self.starts = [], []
+
+    def predict(self, obs, state=None, episode_start=None, deterministic=False):
+        assert episode_start.shape == (1,)
+        count = np.where(episode_start, 0, np.zeros(1) if state is None else state) + 1
+        self.counts.append(int(count[0]))
+        self.starts.append(bool(episode_start[0]))
+        return super().predict(obs, deterministic)[0], count
+
+
+def test_a_policy_with_a_state_is_given_it_back():
+    policy = Remembering()
+    assert evaluate(policy, **SHORT | {"seconds": 1.0}).survival_rate == 1.0
+    assert policy.counts == [*range(1, 51)] * 2
+    assert policy.starts == [i == 0 for i in range(50)] * 2
+
+
 def test_env_kwargs_come_from_the_policy():
     result = evaluate(Scripted(env_kwargs={"control_hz": 100}), **SHORT)
     assert result.success_rate == 1.0 and result.velocity_error < 0.02
