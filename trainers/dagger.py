@@ -21,6 +21,7 @@ from trainers.dataset import Demonstrations
 from trainers.environments import derive_seed
 from trainers.expert_policy import ExpertPolicy
 from trainers.files import write_atomically
+from trainers.learner import Learner
 from trainers.policy import MultiHeadPolicy
 from trainers.tensorboard import make_logger
 
@@ -34,6 +35,9 @@ class DAggerConfig:
         beta: probability that a block of the first round is the expert's.
         beta_decay: factor on beta per round.
         block_s: shortest and longest block [s].
+        takeover_rad: the expert takes over when the root mean square over the joints of the learner's joint targets
+            less its own exceeds this [rad]; None never. See `trainers.BlockCollector`.
+        round_weight: how many times as often a row of a round is drawn in training as a row of the base.
         seed: of everything random in collection.
 
     Raises:
@@ -44,6 +48,8 @@ class DAggerConfig:
     beta: float = 0.5
     beta_decay: float = 1.0
     block_s: tuple[float, float] = (0.3, 1.0)
+    takeover_rad: float | None = None
+    round_weight: int = 1
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -54,6 +60,10 @@ class DAggerConfig:
             raise InvalidInputError(f"beta and beta_decay must lie in [0, 1], got {self}")
         if len(self.block_s) != 2 or not 0 < self.block_s[0] <= self.block_s[1]:
             raise InvalidInputError(f"block_s must be 0 < shortest <= longest, got {self.block_s}")
+        if self.takeover_rad is not None and not self.takeover_rad > 0:
+            raise InvalidInputError(f"takeover_rad must be None or positive, got {self.takeover_rad}")
+        if isinstance(self.round_weight, bool) or not isinstance(self.round_weight, int) or self.round_weight < 1:
+            raise InvalidInputError(f"round_weight must be an integer of at least 1, got {self.round_weight!r}")
 
     def beta_of(self, round_num: int) -> float:
         """Probability of an expert block in a round, counted from 0."""
@@ -151,8 +161,10 @@ class DAggerTrainer(imitation_dagger.DAggerTrainer):
         if rows is None:
             collector = self.create_trajectory_collector(seconds)
             self._drive(collector)
-            self.logger.record("dagger/learner_share", collector.learner_share)
-            rows = dataclasses.replace(self.base, **collector.recorded(), meta=meta)
+            counts = {"falls": collector.falls, "takeovers": collector.takeovers}
+            for name, value in ({"learner_share": collector.learner_share} | counts).items():
+                self.logger.record(f"dagger/{name}", value)
+            rows = dataclasses.replace(self.base, **collector.recorded(), meta=meta | counts)
             rows.save(path)
         self._rounds.append(rows)
         return rows
@@ -175,10 +187,12 @@ class DAggerTrainer(imitation_dagger.DAggerTrainer):
             self.bc_trainer.steps_done += self.bc_trainer.config.steps
         else:
             data = self.rows
+            weights = np.full(len(data), self.config.round_weight)
+            weights[: len(self.base)] = 1
             self.logger.record("dagger/round", self.round_num)
             self.logger.record("dagger/rows", len(data))
             seed = derive_seed("round", self.bc_trainer.config.seed, self.round_num)
-            history = self.bc_trainer.fit(data, self.validation, self.progress, on_batch_end, seed)
+            history = self.bc_trainer.fit(data, self.validation, self.progress, on_batch_end, seed, weights)
             self.policy.save(path)
         self.round_num += 1
         return history
@@ -192,13 +206,15 @@ class DAggerTrainer(imitation_dagger.DAggerTrainer):
         self.venv.seed(round_seed)
         return BlockCollector(
             self.venv,
-            lambda obs: self.policy.predict(obs, deterministic=True)[0],
+            Learner(self.policy),
             self.beta_schedule(self.round_num),
             self._demo_dir_path_for_round(),
             np.random.default_rng(round_seed),
             rows_per_env=self._rows_per_env(seconds),
             control_hz=self.base.control_hz,
             block_s=self.config.block_s,
+            half_range=self.base.half_range,
+            takeover_rad=self.config.takeover_rad,
         )
 
     def extend_and_update(self, bc_train_kwargs: Any = None) -> int:
@@ -246,7 +262,10 @@ class DAggerTrainer(imitation_dagger.DAggerTrainer):
         path = self.scratch_dir / "config.json"
         if not path.is_file():
             write_atomically(path, lambda file: file.write(text.encode()))
-        elif json.loads(path.read_text()) != json.loads(text):
+            return
+        found = json.loads(path.read_text())
+        found["config"] = dataclasses.asdict(DAggerConfig()) | found.get("config", {})  # options that came later
+        if found != json.loads(text):
             raise ShardMismatchError(f"{self.scratch_dir} holds rounds made with other settings; use another folder")
 
 
@@ -256,6 +275,7 @@ def _read_round(path: Path, meta: dict[str, Any]) -> Demonstrations | None:
         rows = Demonstrations.load(path)
     except InvalidInputError:  # absent or damaged
         return None
-    if rows.meta != meta:
-        raise ShardMismatchError(f"{path} was made from {rows.meta}, now asked for {meta}; use another folder")
+    made_from = {key: rows.meta.get(key) for key in meta}
+    if made_from != meta:
+        raise ShardMismatchError(f"{path} was made from {made_from}, now asked for {meta}; use another folder")
     return rows

@@ -1,4 +1,6 @@
-"""DAgger rounds on the stub: who drives, what is recorded, resuming."""
+"""DAgger rounds on the stub: labels, aggregation, notes, resuming."""
+
+import json
 
 import numpy as np
 import pytest
@@ -6,14 +8,14 @@ from imitation.algorithms import dagger as imitation_dagger
 from stable_baselines3.common.vec_env import DummyVecEnv
 
 from go1_mtl_gym.errors import InvalidInputError
-from tests.trainer.stub_env import SIZE, StubEnv
-from tests.trainer.test_collection import LAYOUT, expected_labels
+from tests.trainer.stub_env import StubEnv
+from tests.trainer.test_collection import LAYOUT, trot_labels
 from trainers import (
     BCConfig,
-    BlockCollector,
     DAggerConfig,
     DAggerTrainer,
     ShardMismatchError,
+    TensorBatches,
     make_logger,
     offline_metrics,
 )
@@ -21,80 +23,14 @@ from trainers import (
 SMALL = BCConfig(steps=20, batch_size=64, log_interval=10)
 
 
-def drive(collector: BlockCollector) -> list[np.ndarray]:
-    """Step with the environments' own experts until all have their rows; the executed actions."""
-    obs = collector.reset()
-    executed = []
-    while not collector.finished:
-        obs, *_ = collector.step(np.stack(collector.venv.env_method("expert_action")))
-        executed.append(obs[:, LAYOUT["last_action"]])
-    return executed
-
-
-def make_collector(venv, rows, beta=0.5, learner=lambda obs: np.full((len(obs), 12), 0.1), **kwargs) -> BlockCollector:
-    return BlockCollector(
-        venv, learner, beta, "unused", np.random.default_rng(0), rows_per_env=rows, control_hz=50, **kwargs
-    )
-
-
-def test_blocks_are_long_and_both_drive():
-    venv = DummyVecEnv([lambda: StubEnv(episode_s=100.0)])
-    collector = make_collector(venv, 2000)
-    learner_drove = np.array([np.allclose(a[0], 0.1) for a in drive(collector)])
-    assert 0.3 < learner_drove.mean() < 0.7
-    assert collector.learner_share == pytest.approx(learner_drove.mean(), abs=1e-3)
-    changes = np.flatnonzero(np.diff(learner_drove.astype(int)))
-    assert np.diff(changes).min() >= 15 and len(changes) > 10
-
-
-@pytest.mark.parametrize(("beta", "share"), [(0.0, 1.0), (1.0, 0.0)])
-def test_extremes_of_beta(beta, share):
-    collector = make_collector(DummyVecEnv([StubEnv]), 100, beta)
-    drive(collector)
-    assert collector.learner_share == share
-
-
 def test_labels_are_the_experts_whoever_drives(venv, demos, policy, tmp_path):
     trainer = DAggerTrainer(venv, policy, demos, DAggerConfig(seconds_per_task=4.0), SMALL, scratch_dir=tmp_path)
     rows = trainer.collect_round()
     assert {name: len(part) for name, part in rows.per_task().items()} == dict.fromkeys(demos.tasks, 200)
     trot = rows.per_task()["trot"]
-    np.testing.assert_allclose(trot.acts, expected_labels(trot), atol=1e-5)
+    np.testing.assert_allclose(trot.acts, trot_labels(trot.obs), atol=1e-5)
     followed = trot.obs[1:, LAYOUT["last_action"]][~trot.starts[1:]] - trot.acts[:-1][~trot.starts[1:]]
     assert 0.1 < np.isclose(followed, 0, atol=1e-5).all(1).mean() < 0.9
-
-
-def test_finished_environments_are_not_recorded():
-    venv = DummyVecEnv([StubEnv, lambda: StubEnv("walk")])
-    driven = []
-
-    def learner(obs):
-        driven.append(obs[:, SIZE:].argmax(1))
-        return np.zeros((len(obs), 12))
-
-    collector = make_collector(venv, np.array([30, 90]), beta=0.0, learner=learner)
-    drive(collector)
-    recorded = collector.recorded()
-    assert recorded["obs"][:, SIZE:].sum(0).tolist() == [30, 0, 0, 90]
-    assert all(3 in tasks for tasks in driven) and sum(0 in tasks for tasks in driven) == 30
-
-
-def test_end_before_a_fall_is_dropped_and_time_limits_are_not():
-    falls = make_collector(DummyVecEnv([lambda: StubEnv(expert_falls_after_s=1.0)]), 60, beta=1.0)
-    drive(falls)
-    recorded = falls.recorded()
-    assert np.flatnonzero(recorded["starts"]).tolist() == [0, 39] and recorded["acts"][:, 2].max() < 0.9
-    limited = make_collector(DummyVecEnv([lambda: StubEnv(episode_s=0.4)]), 60, beta=1.0)
-    drive(limited)
-    assert np.flatnonzero(limited.recorded()["starts"]).tolist() == [0, 20, 40]
-
-
-def test_learner_that_always_falls():
-    from trainers.collector import StarvedCollectorError
-
-    collector = make_collector(DummyVecEnv([StubEnv]), 100, beta=0.0, learner=lambda obs: np.ones((len(obs), 12)))
-    with pytest.raises(StarvedCollectorError, match="kept"):
-        drive(collector)
 
 
 def test_rounds_aggregate_train_and_log(venv, demos, policy, tmp_path):
@@ -111,6 +47,38 @@ def test_rounds_aggregate_train_and_log(venv, demos, policy, tmp_path):
     assert offline_metrics(policy, demos)["trot"]["mse"] < before
     log = (tmp_path / "log" / "progress.json").read_text()
     assert all(f'"dagger/rows": {len(demos) + new}' in log for new in (400, 800))
+
+
+def test_falls_and_takeovers_are_noted_and_resuming_does_not_mind(venv, demos, policy, tmp_path):
+    def trainer(limit, folder, **kwargs):
+        config = DAggerConfig(seconds_per_task=1.0, takeover_rad=limit)
+        return DAggerTrainer(venv, policy, demos, config, SMALL, scratch_dir=tmp_path / folder, **kwargs)
+
+    free, logger = trainer(None, "free").collect_round(), make_logger(tmp_path / "log", ("json",))
+    safe = trainer(1e-6, "safe", logger=logger).collect_round()
+    logger.dump(0)
+    assert free.meta["takeovers"] == 0 and free.meta["falls"] > 0
+    assert safe.meta["takeovers"] > 0 and safe.meta["falls"] == 0
+    log = json.loads((tmp_path / "log" / "progress.json").read_text())
+    assert log["dagger/takeovers"] == safe.meta["takeovers"] and log["dagger/falls"] == log["dagger/learner_share"] == 0
+    again = trainer(1e-6, "safe").collect_round()
+    np.testing.assert_array_equal(again.obs, safe.obs)
+    assert again.meta == safe.meta
+    with pytest.raises(ShardMismatchError, match="now asked for"):
+        trainer(1e-6, "safe").collect_round(seconds_per_task=2.0)
+
+
+def test_rows_of_rounds_weigh_more(venv, demos, policy, tmp_path):
+    config = DAggerConfig(seconds_per_task=1.0, round_weight=5)
+    trainer = DAggerTrainer(venv, policy, demos, config, SMALL, scratch_dir=tmp_path)
+    trainer.collect_round()
+    with pytest.MonkeyPatch.context() as patch:
+        given = []
+        patch.setattr("trainers.bc.TensorBatches", lambda *args: given.append(args) or TensorBatches(*args))
+        trainer.train_round()
+    data, weights = given[0][0], given[0][-1]
+    assert len(data) == len(weights) == len(demos) + 200
+    assert set(weights[: len(demos)]) == {1} and set(weights[len(demos) :]) == {5}
 
 
 def test_resume_reuses_finished_parts(demos, policy, tmp_path):
@@ -138,8 +106,20 @@ def test_resume_reuses_finished_parts(demos, policy, tmp_path):
 
 def test_folder_of_other_settings(venv, demos, policy, tmp_path):
     DAggerTrainer(venv, policy, demos, scratch_dir=tmp_path)
+    for other in ({"beta": 0.1}, {"takeover_rad": 0.1}, {"round_weight": 2}):
+        with pytest.raises(ShardMismatchError, match="other settings"):
+            DAggerTrainer(venv, policy, demos, DAggerConfig(**other), scratch_dir=tmp_path)
+
+
+def test_folder_from_before_an_option_was_there(venv, demos, policy, tmp_path):
+    DAggerTrainer(venv, policy, demos, scratch_dir=tmp_path)
+    path = tmp_path / "config.json"
+    settings = json.loads(path.read_text())
+    del settings["config"]["takeover_rad"], settings["config"]["round_weight"]
+    path.write_text(json.dumps(settings))
+    DAggerTrainer(venv, policy, demos, scratch_dir=tmp_path)
     with pytest.raises(ShardMismatchError, match="other settings"):
-        DAggerTrainer(venv, policy, demos, DAggerConfig(beta=0.1), scratch_dir=tmp_path)
+        DAggerTrainer(venv, policy, demos, DAggerConfig(round_weight=2), scratch_dir=tmp_path)
 
 
 def test_training_without_collecting(venv, demos, policy, tmp_path):
@@ -148,7 +128,18 @@ def test_training_without_collecting(venv, demos, policy, tmp_path):
         trainer.train_round()
 
 
-@pytest.mark.parametrize("kwargs", [{"beta": 2}, {"seconds_per_task": 0}, {"block_s": (1, 0.5)}, {"seed": -1}])
+@pytest.mark.parametrize(
+    "kwargs",
+    [
+        {"beta": 2},
+        {"seconds_per_task": 0},
+        {"block_s": (1, 0.5)},
+        {"seed": -1},
+        {"takeover_rad": 0.0},
+        {"round_weight": 0},
+        {"round_weight": 1.5},
+    ],
+)
 def test_bad_configuration(kwargs):
     with pytest.raises(InvalidInputError):
         DAggerConfig(**kwargs)
