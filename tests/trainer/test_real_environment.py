@@ -12,6 +12,7 @@ from trainers import (
     PerturbationConfig,
     collect,
     evaluate,
+    evaluate_switch,
     load,
     make_env,
     make_venv,
@@ -50,3 +51,9 @@ def test_clone_correct_save_and_evaluate(tmp_path):
     again = load(tmp_path / "policy.zip")
     one, other = (evaluate(p, "trot", 1, 1.0) for p in (policy, again))
     assert one.as_dict() == other.as_dict() and 0 < one.survival_s <= 1.0
+
+
+def test_expert_changes_gait():
+    for first, second in (("trot", "walk"), ("jump", "trot")):
+        result = evaluate_switch("expert", first, second, 1, before_s=0.5, after_s=4.0)
+        assert result.success_rate == 1.0, result
