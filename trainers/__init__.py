@@ -11,7 +11,8 @@ if TYPE_CHECKING:
     from trainers.batches import TensorBatches
     from trainers.bc import BCConfig, BCHistory, BCTrainer, train_bc
     from trainers.checkpoint import CheckpointError, load
-    from trainers.collection import CollectJob, ShardMismatchError, collect, collect_all
+    from trainers.clockless import ClocklessPolicy
+    from trainers.collection import CollectJob, ShardMismatchError, collect, collect_all, watch
     from trainers.collector import BlockCollector
     from trainers.dagger import DAggerConfig, DAggerTrainer
     from trainers.dataset import Demonstrations
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from trainers.learner import Learner
     from trainers.losses import MultiTaskLoss
     from trainers.metrics import offline_metrics
+    from trainers.phase import PhaseConfig, PhaseEstimator, phase_errors, train_phase
     from trainers.policy import MultiHeadPolicy
     from trainers.recording import record_frames, save_gif, tile
     from trainers.report import paper_table, results_table
@@ -35,6 +37,7 @@ _HOME = {
     "BCTrainer": "bc",
     "BlockCollector": "collector",
     "CheckpointError": "checkpoint",
+    "ClocklessPolicy": "clockless",
     "ClosedLoopResult": "scoring",
     "CollectJob": "collection",
     "DAggerConfig": "dagger",
@@ -46,6 +49,8 @@ _HOME = {
     "MultiHeadPolicy": "policy",
     "MultiTaskLoss": "losses",
     "PerturbationConfig": "environments",
+    "PhaseConfig": "phase",
+    "PhaseEstimator": "phase",
     "ShardMismatchError": "collection",
     "TensorBatches": "batches",
     "collect": "collection",
@@ -62,11 +67,14 @@ _HOME = {
     "make_venv": "environments",
     "offline_metrics": "metrics",
     "paper_table": "report",
+    "phase_errors": "phase",
     "record_frames": "recording",
     "results_table": "report",
     "save_gif": "recording",
     "tile": "recording",
     "train_bc": "bc",
+    "train_phase": "phase",
+    "watch": "collection",
 }
 
 __all__ = [
@@ -75,6 +83,7 @@ __all__ = [
     "BCTrainer",
     "BlockCollector",
     "CheckpointError",
+    "ClocklessPolicy",
     "ClosedLoopResult",
     "CollectJob",
     "DAggerConfig",
@@ -86,6 +95,8 @@ __all__ = [
     "MultiHeadPolicy",
     "MultiTaskLoss",
     "PerturbationConfig",
+    "PhaseConfig",
+    "PhaseEstimator",
     "ShardMismatchError",
     "TensorBatches",
     "collect",
@@ -102,11 +113,14 @@ __all__ = [
     "make_venv",
     "offline_metrics",
     "paper_table",
+    "phase_errors",
     "record_frames",
     "results_table",
     "save_gif",
     "tile",
     "train_bc",
+    "train_phase",
+    "watch",
 ]
 
 

@@ -17,10 +17,13 @@ from go1_mtl_gym.errors import InvalidInputError
 from trainers.files import write_atomically
 
 if TYPE_CHECKING:
+    from trainers.clockless import ClocklessPolicy
     from trainers.policy import MultiHeadPolicy
 
 FORMAT = "go1-mtl-gym policy"
 FORMAT_VERSION = 1
+WEIGHTS = "weights.safetensors"
+PHASE_WEIGHTS = "phase.safetensors"
 PACKAGES = (
     "go1-mtl-gym",
     "numpy",
@@ -38,36 +41,45 @@ class CheckpointError(InvalidInputError):
     """A file is not a policy that this version can read."""
 
 
-def save(policy: "MultiHeadPolicy", path: str | PathLike[str]) -> None:
+def save(policy: "MultiHeadPolicy | ClocklessPolicy", path: str | PathLike[str]) -> None:
     """Write a policy; whoever reads `path` meanwhile sees the old file or the new one, never a part.
 
     Raises:
         InvalidInputError: if `env_kwargs` hold something that JSON cannot.
     """
+    student = getattr(policy, "student", policy)
     description = {
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
-        "network": policy.network_kwargs(),
-        "observation_space": _space_to_json(policy.observation_space),
-        "action_space": _space_to_json(policy.action_space),
+        "network": student.network_kwargs(),
+        "observation_space": _space_to_json(student.observation_space),
+        "action_space": _space_to_json(student.action_space),
         "versions": versions(),
     }
+    if student is not policy:
+        estimator = policy.estimator
+        description["clockless"] = {
+            "history": estimator.layout.history,
+            "width": estimator.width,
+            "correction": policy.correction,
+        }
     try:
         text = json.dumps(description, indent=1, allow_nan=False)
     except (TypeError, ValueError) as error:
         raise InvalidInputError(f"env_kwargs must be JSON values to be saved, got {policy.env_kwargs!r}") from error
-    weights = {name: value.detach().cpu().contiguous() for name, value in policy.state_dict().items()}
 
     def write(file: BinaryIO) -> None:
         with zipfile.ZipFile(file, "w") as archive:
             archive.writestr("policy.json", text)
-            archive.writestr("weights.safetensors", safetensors.torch.save(weights))
+            archive.writestr(WEIGHTS, _to_bytes(student))
+            if student is not policy:
+                archive.writestr(PHASE_WEIGHTS, _to_bytes(policy.estimator))
 
     write_atomically(path, write)
 
 
-def load(path: str | PathLike[str], device: torch.device | str = "cpu") -> "MultiHeadPolicy":
-    """Read a policy that `MultiHeadPolicy.save` wrote, in evaluation mode.
+def load(path: str | PathLike[str], device: torch.device | str = "cpu") -> "MultiHeadPolicy | ClocklessPolicy":
+    """Read a policy that was saved, in evaluation mode.
 
     Args:
         path: the zip file.
@@ -84,12 +96,31 @@ def load(path: str | PathLike[str], device: torch.device | str = "cpu") -> "Mult
         spaces = [_space_from_json(description[name]) for name in ("observation_space", "action_space")]
         policy = MultiHeadPolicy(*spaces, seed=0, **network)
         policy.seed = None
-        policy.load_state_dict(weights)
+        policy.load_state_dict(weights[WEIGHTS])
+        if "clockless" in description:
+            policy = _clockless(policy, description["clockless"], weights[PHASE_WEIGHTS])
     except (KeyError, TypeError, ValueError, RuntimeError) as error:
         raise CheckpointError(f"{path} does not hold a consistent policy: {error}") from error
     policy.to(torch.device(device))
     policy.set_training_mode(False)
     return policy
+
+
+def _clockless(
+    student: "MultiHeadPolicy", description: dict[str, Any], weights: dict[str, torch.Tensor]
+) -> "ClocklessPolicy":
+    from trainers.clockless import ClocklessPolicy, clockless_layout
+    from trainers.phase import PhaseEstimator
+
+    estimator = PhaseEstimator(clockless_layout(student, description["history"]), description["width"])
+    estimator.load_state_dict(weights)
+    return ClocklessPolicy(student, estimator, description["correction"])
+
+
+def _to_bytes(module: torch.nn.Module) -> bytes:
+    return safetensors.torch.save(
+        {name: value.detach().cpu().contiguous() for name, value in module.state_dict().items()}
+    )
 
 
 def versions() -> dict[str, str]:
@@ -103,7 +134,8 @@ def versions() -> dict[str, str]:
     return found
 
 
-def _read(path: Path) -> tuple[dict[str, Any], dict[str, torch.Tensor]]:
+def _read(path: Path) -> tuple[dict[str, Any], dict[str, dict[str, torch.Tensor]]]:
+    """The description, and the tensors of every file of weights."""
     if not path.is_file():
         raise CheckpointError(f"no policy at {path}: there is no such file")
     try:
@@ -114,7 +146,8 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, torch.Tensor]]:
                     "reads what PPO.save wrote)"
                 )
             description = json.loads(archive.read("policy.json"))
-            weights = safetensors.torch.load(archive.read("weights.safetensors"))
+            files = [name for name in archive.namelist() if name in (WEIGHTS, PHASE_WEIGHTS)]
+            weights = {name: safetensors.torch.load(archive.read(name)) for name in files}
     except CheckpointError:
         raise
     except Exception as error:  # zip, JSON and safetensors each raise their own on damage

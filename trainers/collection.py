@@ -2,7 +2,7 @@
 
 import dataclasses
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from threadpoolctl import threadpool_limits
 from tqdm.auto import tqdm
 
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
+from go1_mtl_gym.observation import ObservationLayout
 from trainers.dataset import Demonstrations
 from trainers.environments import EnvFactory, PerturbationConfig, WithTasks, derive_seed, make_env
 
@@ -96,12 +97,49 @@ def collect(
         perturbation = dataclasses.replace(perturbation, command_interval=None)
     env = make_env(task, perturbation, **{"episode_s": EPISODE_S, **job.env_kwargs})
     try:
-        return _record(env, job)
+        return _record(env, job, lambda obs: env.unwrapped.expert_action())
     finally:
         env.close()
 
 
-def _record(env: Any, job: CollectJob) -> Demonstrations:
+def watch(
+    policy: Any,
+    task: str,
+    seed: int = 0,
+    seconds: float = 30.0,
+    perturbation: PerturbationConfig | None = None,
+    history: int = 1,
+    *,
+    make_env: EnvFactory = make_env,
+    **env_kwargs: Any,
+) -> tuple[Demonstrations, ObservationLayout]:
+    """Let a policy without a state drive, and record what it did; no expert is asked.
+
+    Args:
+        policy: with ``predict(obs, deterministic=True)`` and `env_kwargs`, of one frame of proprioception.
+        task, seed, seconds, perturbation: as in `CollectJob`.
+        history: frames of proprioception that are recorded; the policy sees the newest.
+        make_env: another environment factory.
+        env_kwargs: of the environment; on top of the policy's own ``env_kwargs``.
+
+    Returns:
+        The rows, and the layout of their observations.
+
+    Raises:
+        CollectionError: if falls leave less than a fifth of the steps.
+    """
+    job = CollectJob(task, seed, seconds, None, perturbation, {**policy.env_kwargs, "history": history, **env_kwargs})
+    env = make_env(task, perturbation, **{"episode_s": EPISODE_S, **job.env_kwargs})
+    layout = env.unwrapped.layout
+    columns = layout.columns(ObservationLayout(layout.tasks, layout.channels))
+    try:
+        return _record(env, job, lambda obs: policy.predict(obs[columns], deterministic=True)[0]), layout
+    finally:
+        env.close()
+
+
+def _record(env: Any, job: CollectJob, act: Callable[[np.ndarray], np.ndarray]) -> Demonstrations:
+    """The rows of a job: what was seen, and what `act` made of it; it also drives."""
     base = env.unwrapped
     wanted = round(job.seconds * base.control_hz)
     obs_rows: list[np.ndarray] = []
@@ -116,7 +154,7 @@ def _record(env: Any, job: CollectJob) -> Demonstrations:
         obs, _ = env.reset(seed=derive_seed("collect", job.task, job.seed, episode), options=options)
         ended = False
         while not ended and len(obs_rows) < wanted:
-            label = base.expert_action()
+            label = act(obs)
             obs_rows.append(obs)
             act_rows.append(label)
             obs, _, terminated, truncated, _ = env.step(label)
@@ -126,7 +164,7 @@ def _record(env: Any, job: CollectJob) -> Demonstrations:
                 keep = max(starts[-1], len(obs_rows) - round(BEFORE_FALL_S * base.control_hz))
                 del obs_rows[keep:], act_rows[keep:]
         if steps > 5 * wanted + base.control_hz * EPISODE_S:
-            raise CollectionError(f"the expert keeps falling: kept {len(obs_rows)} of {steps} steps of {job.as_dict()}")
+            raise CollectionError(f"the driver keeps falling: kept {len(obs_rows)} of {steps} steps of {job.as_dict()}")
     marks = np.zeros(len(obs_rows), dtype=bool)
     marks[[start for start in starts if start < len(obs_rows)]] = True
     return Demonstrations(

@@ -1,0 +1,191 @@
+"""A student without a clock: it tells the phase of its gait from what it feels."""
+
+from os import PathLike
+from typing import Any
+
+import numpy as np
+import torch
+from gymnasium import spaces
+from stable_baselines3.common.policies import BasePolicy
+
+from go1_mtl_gym import TASKS
+from go1_mtl_gym.clock import STAND_COMMAND
+from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.observation import ObservationLayout
+from trainers.phase import PhaseEstimator, unit
+from trainers.policy import MultiHeadPolicy
+
+PHASE_0 = np.array([0.0, 1.0], dtype=np.float32)
+"""Sine and cosine of phase 0."""
+
+
+class ClocklessPolicy(BasePolicy):
+    """A student that learned with a gait clock, and an estimator that takes the clock's place.
+
+    Its observation is the student's without the phase, with as many frames of proprioception as the estimator reads.
+    The estimate e (sine, cosine) corrects a clock c that the policy keeps as its state:
+
+        c' = unit((1 - correction) R c + correction e),
+
+    where R turns by one control period of the gait. With a correction of 1 there is no memory: the action is a function
+    of the observation. Below 1 it is a clock with correction, which stands while the command asks for it and starts at
+    phase 0 with an episode and with a change of task.
+
+    Args:
+        student: sees the channels "command" and "phase"; its `env_kwargs` name its tasks.
+        estimator: of the same tasks, and of the student's channels but for the phase.
+        correction: in (0, 1].
+
+    Raises:
+        InvalidInputError: if the two do not fit together, or the correction is outside its range.
+    """
+
+    def __init__(self, student: MultiHeadPolicy, estimator: PhaseEstimator, correction: float = 1.0) -> None:
+        layout = estimator.layout
+        clocked = student_layout(student)
+        if not {"command", "phase"} <= set(clocked.channels) or clocked.history != 1:
+            raise InvalidInputError(f"the student must see command, phase and one frame, got {clocked.channels}")
+        if layout.tasks != clocked.tasks or layout.channels != without_phase(clocked.channels):
+            raise InvalidInputError(
+                f"the estimator must have the tasks {clocked.tasks} and the channels "
+                f"{without_phase(clocked.channels)}, got {layout.tasks} and {layout.channels}"
+            )
+        if not 0 < correction <= 1:
+            raise InvalidInputError(f"correction must lie in (0, 1], got {correction!r}")
+        super().__init__(spaces.Box(layout.low, layout.high, dtype=np.float32), student.action_space)
+        self.student = student
+        self.estimator = estimator
+        self.correction = float(correction)
+        self.n_tasks = layout.n_tasks
+        channels = {"channels": layout.channels, "history": layout.history}
+        self.env_kwargs = student.env_kwargs | {"tasks": layout.tasks} | channels
+        gaits = [TASKS[name].gait for name in layout.tasks]
+        self._turn = np.array([1.0 / (gait.period * self.env_kwargs.get("control_hz", 50)) for gait in gaits])
+        self._can_stand = np.array([gait.can_stand for gait in gaits])
+        self._command = layout.slices["command"]
+        self._columns = _columns(layout, clocked)
+        self._phase = clocked.slices["phase"]
+
+    def predict(
+        self,
+        observation: np.ndarray,
+        state: tuple[np.ndarray, ...] | None = None,
+        episode_start: np.ndarray | None = None,
+        deterministic: bool = False,
+    ) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
+        """Actions of one observation (D,) or a batch (n, D), and the state for the next call.
+
+        Args:
+            observation: of any mix of tasks.
+            state: what the last call returned for the same environments: clocks (n, 2) and task indices (n,); None at
+                the beginning.
+            episode_start: True where an episode begins, bool, shape (n,).
+            deterministic: without exploration noise.
+
+        Raises:
+            InvalidInputError: if an observation has another size or is not finite, or does not end in a task id.
+        """
+        obs = np.asarray(observation, dtype=np.float32)
+        rows = obs.reshape(-1, obs.shape[-1])
+        if rows.shape[1] != self.estimator.layout.size or not np.isfinite(rows).all():
+            raise InvalidInputError(
+                f"observations must hold {self.estimator.layout.size} finite numbers, got {obs.shape} "
+                f"with {int((~np.isfinite(rows)).sum())} that are not finite"
+            )
+        task = rows[:, -self.n_tasks :].argmax(axis=1)
+        clock = self.estimator.estimate(rows)
+        if self.correction < 1:
+            kept = self._running_clock(rows, task, state, episode_start)
+            clock = unit((1 - self.correction) * kept + self.correction * clock)
+        actions, _ = self.student.predict(self._with_clock(rows, clock), deterministic=deterministic)
+        return actions.reshape(*obs.shape[:-1], -1), (clock, task)
+
+    def _running_clock(
+        self, rows: np.ndarray, task: np.ndarray, state: tuple[np.ndarray, ...] | None, starts: np.ndarray | None
+    ) -> np.ndarray:
+        """The clocks one period later, (n, 2); at phase 0 where an episode or a task begins or the robot stands."""
+        if state is None:
+            return np.tile(PHASE_0, (len(rows), 1))
+        clock, before = state
+        turns = np.arctan2(clock[:, 0], clock[:, 1]) / (2 * np.pi) % 1.0
+        later = turns + self._turn[task]
+        stands = (np.abs(rows[:, self._command]) < STAND_COMMAND).all(axis=1) & self._can_stand[task]
+        anew = (task != before) | (stands & (later >= 1.0))
+        if starts is not None:
+            anew |= np.asarray(starts, dtype=bool)
+        angle = 2 * np.pi * np.where(anew, 0.0, later)
+        return np.stack([np.sin(angle), np.cos(angle)], axis=1).astype(np.float32)
+
+    def _with_clock(self, rows: np.ndarray, clock: np.ndarray) -> np.ndarray:
+        """The student's observations."""
+        full = rows[:, self._columns]
+        full[:, self._phase] = clock
+        return full
+
+    def _predict(self, observation: torch.Tensor, deterministic: bool = False) -> torch.Tensor:
+        actions, _ = self.predict(observation.cpu().numpy(), deterministic=deterministic)
+        return torch.as_tensor(actions, device=self.device)
+
+    def _get_constructor_parameters(self) -> dict[str, Any]:
+        """All that rebuilds an equal policy, but for the weights."""
+        return {"student": self.student, "estimator": self.estimator, "correction": self.correction}
+
+    # -- Files ---------------------------------------------------------------------------------------------------------
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the policy to one zip file without pickles; see `trainers.checkpoint`."""
+        from trainers.checkpoint import save
+
+        save(self, path)
+
+    @classmethod
+    def load(cls, path: str | PathLike[str], device: torch.device | str = "cpu") -> "ClocklessPolicy":
+        """Read what `save` wrote.
+
+        Raises:
+            CheckpointError: if the file is missing, damaged, or something else.
+        """
+        from trainers.checkpoint import CheckpointError, load
+
+        policy = load(path, device)
+        if not isinstance(policy, cls):
+            raise CheckpointError(f"{path} holds a {type(policy).__name__}, a {cls.__name__} was expected")
+        return policy
+
+
+def without_phase(channels: tuple[str, ...]) -> tuple[str, ...]:
+    """The channels but for the phase."""
+    return tuple(name for name in channels if name != "phase")
+
+
+def clockless_layout(student: MultiHeadPolicy, history: int) -> ObservationLayout:
+    """What an estimator for a student sees: its channels but for the phase, and `history` frames."""
+    clocked = student_layout(student)
+    return ObservationLayout(clocked.tasks, without_phase(clocked.channels), history)
+
+
+def student_layout(policy: Any) -> ObservationLayout:
+    """The layout of a policy's observations, by its `env_kwargs`.
+
+    Raises:
+        InvalidInputError: if its observations have another size.
+    """
+    kwargs = policy.env_kwargs
+    layout = ObservationLayout(
+        tuple(kwargs.get("tasks") or TASKS), kwargs.get("channels", ()), kwargs.get("history", 1)
+    )
+    if policy.observation_space.shape != (layout.size,):
+        raise InvalidInputError(
+            f"by its env_kwargs the policy's observations have {layout.size} entries, its space is "
+            f"{policy.observation_space.shape}"
+        )
+    return layout
+
+
+def _columns(layout: ObservationLayout, clocked: ObservationLayout) -> np.ndarray:
+    """Where the student's entries stand in the estimator's observation; anything for the phase, which is not there."""
+    columns = np.zeros(clocked.size, dtype=int)
+    for name, where in clocked.slices.items():
+        if name in layout.slices:
+            columns[where] = np.arange(where.stop - where.start) + layout.slices[name].start
+    return columns
