@@ -13,6 +13,7 @@ from go1_mtl_gym.estimator import EstimatorNoise
 from go1_mtl_gym.gaits import GAITS, Gait
 from go1_mtl_gym.observation import ObservationLayout, SensorNoise
 from go1_mtl_gym.perturbation import PerturbationWrapper
+from go1_mtl_gym.randomization import DomainRandomization
 from go1_mtl_gym.registration import env_id, register_built_in, register_task
 from go1_mtl_gym.state import RobotState
 from go1_mtl_gym.tasks import PAPER_TASKS, TASKS, Task
@@ -21,6 +22,7 @@ __all__ = [
     "GAITS",
     "PAPER_TASKS",
     "TASKS",
+    "DomainRandomization",
     "EstimatorNoise",
     "Gait",
     "Go1Env",

@@ -1,16 +1,22 @@
 """Checks of what users pass to the environment; every message says what came and what was expected."""
 
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import Any, TypeVar
 
 import numpy as np
 
+from go1_mtl_gym.conditions import Conditions
 from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.estimator import EstimatorNoise
+from go1_mtl_gym.observation import SensorNoise
+from go1_mtl_gym.randomization import DomainRandomization
+from go1_mtl_gym.realism import Realism
 from go1_mtl_gym.simulation import PHYSICS_HZ
 from go1_mtl_gym.tasks import TASKS
 from go1_mtl_gym.validation import number_in, one_of
 
-Noise = TypeVar("Noise")
+Kind = TypeVar("Kind")
 
 
 def check_control_hz(control_hz: object) -> int:
@@ -37,16 +43,36 @@ def check_rendering(render_mode: object, modes: list[str], width: object, height
         one_of(render_mode, modes, "render_mode")
 
 
-def check_noise(noise: Noise | bool | None, kind: type[Noise], what: str) -> Noise | None:
-    """Return the noise asked for: True is the default of its kind, None and False are none.
+def check_switch(value: Kind | bool | None, kind: type[Kind], what: str) -> Kind | None:
+    """Return what can be switched on: True is the default of its kind, None and False are none.
 
     Raises:
         InvalidInputError: if it is something else.
     """
-    if not (noise is None or isinstance(noise, (bool, kind))):
+    if not (value is None or isinstance(value, (bool, kind))):
         article = "an" if kind.__name__[0] in "AEIOU" else "a"
-        raise InvalidInputError(f"{what} must be None, True, False or {article} {kind.__name__}, got {noise!r}")
-    return kind() if noise is True else (noise or None)
+        raise InvalidInputError(f"{what} must be None, True, False or {article} {kind.__name__}, got {value!r}")
+    return kind() if value is True else (value or None)
+
+
+def check_conditions(given: Mapping[str, Any], figures: Mapping[str, Any]) -> Conditions:
+    """Return what the environment's episodes take place under.
+
+    Args:
+        given: the environment's arguments by name, among them noise, estimator_noise and randomization.
+        figures: all further keyword arguments; those of `Realism`.
+
+    Raises:
+        InvalidInputError: for an unknown name or an impossible figure.
+    """
+    for name in figures:
+        one_of(name, (*given, *(each.name for each in fields(Realism))), "argument of Go1Env")
+    return Conditions(
+        Realism(**figures),
+        check_switch(given["noise"], SensorNoise, "noise"),
+        check_switch(given["estimator_noise"], EstimatorNoise, "estimator_noise"),
+        check_switch(given["randomization"], DomainRandomization, "randomization"),
+    )
 
 
 def check_phase(phase: object) -> float:

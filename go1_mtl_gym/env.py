@@ -10,17 +10,16 @@ import numpy as np
 from gymnasium.error import ResetNeeded
 from gymnasium.spaces import Box
 
-from go1_mtl_gym import robot
+from go1_mtl_gym import arguments, robot
 from go1_mtl_gym.actuation import ActionMap, PDGains
-from go1_mtl_gym.arguments import check_control_hz, check_noise, check_phase, check_rendering, check_reset_options
 from go1_mtl_gym.episode import Episode
-from go1_mtl_gym.estimator import EstimatorError, EstimatorNoise
+from go1_mtl_gym.estimator import EstimatorNoise
 from go1_mtl_gym.expert_hook import DEFAULT_EXPERT, check_expert, load_expert
 from go1_mtl_gym.observation import ObservationLayout, SensorNoise
 from go1_mtl_gym.observer import Observer
+from go1_mtl_gym.randomization import DomainRandomization
 from go1_mtl_gym.realism import Realism
 from go1_mtl_gym.registration import register_task
-from go1_mtl_gym.rewards import reward_terms
 from go1_mtl_gym.simulation import PHYSICS_HZ, Simulation
 from go1_mtl_gym.state import RobotState
 from go1_mtl_gym.tasks import TASKS, Task, check_task_names
@@ -57,18 +56,19 @@ class Go1Env(gymnasium.Env):
         channels: optional parts of the observation: "command", "gravity", "phase", "last_action".
         history: number of proprioceptive frames in the observation.
         control_hz: rate of `step` [Hz]; a divisor of 1000 from 50 to 1000.
-        kp: stiffness of the actuators [N m/rad].
-        kd: damping of the actuators [N m s/rad].
+        kp, kd: stiffness [N m/rad] and damping [N m s/rad] of the actuators.
         noise: True for the default `SensorNoise`, or one of your own; None for exact sensors.
-        friction, payload_kg, action_delay_s: differences from the expert's model, see `go1_mtl_gym.realism.Realism`.
         estimator_noise: True for the default `EstimatorNoise`, or one of your own: the expert then sees
             `estimated_state`; None shows it the true state.
+        randomization: True for the default `DomainRandomization` of physics and sensor noise, drawn at every reset, or
+            one of your own.
         episode_s: length of an episode [s].
         expert: ``"module:Class"`` or a callable; called with ``gains=PDGains, hold_s=control period`` on first use,
             must give an object with ``reset(state)`` and ``action(state)``, which returns 12 joint targets [rad] for a
             `RobotState`.
         render_mode: None, "human" or "rgb_array".
         width, height: size of the picture [pixels].
+        realism: differences from the expert's model: ``friction=``, ``payload_kg=`` and the other fields of `Realism`.
 
     Raises:
         InvalidInputError: if an argument is not as described.
@@ -87,22 +87,22 @@ class Go1Env(gymnasium.Env):
         kp: float = 50.0,
         kd: float = 2.0,
         noise: SensorNoise | bool | None = None,
-        friction: float | None = None,
-        payload_kg: float = 0.0,
-        action_delay_s: float = 0.0,
         estimator_noise: EstimatorNoise | bool | None = None,
+        randomization: DomainRandomization | bool | None = None,
         episode_s: float = 30.0,
         expert: str | Callable[..., Any] = DEFAULT_EXPERT,
         render_mode: str | None = None,
         width: int = 640,
         height: int = 480,
+        **realism: float | None,
     ) -> None:
-        self._arguments = {name: value for name, value in locals().items() if name not in ("self", "__class__")}
+        given = {name: value for name, value in locals().items() if name not in ("self", "__class__", "realism")}
+        self._arguments = given | realism
         self.tasks = self._arguments["tasks"] = check_task_names(tuple(TASKS) if tasks is None else tasks)
         if task is not None:
             one_of(task, self.tasks, "task")
-        self.control_hz = check_control_hz(control_hz)
-        check_rendering(render_mode, self.metadata["render_modes"], width, height)
+        self.control_hz = arguments.check_control_hz(control_hz)
+        arguments.check_rendering(render_mode, self.metadata["render_modes"], width, height)
         self.control_s = 1.0 / self.control_hz
         self.gains = PDGains(kp, kd)
         self.action_map = ActionMap.for_gains(self.gains)
@@ -110,10 +110,10 @@ class Go1Env(gymnasium.Env):
         self.observation_space = Box(self.layout.low, self.layout.high, dtype=np.float32)
         self.action_space = Box(-1.0, 1.0, (12,), dtype=np.float32)
         self.render_mode = render_mode
-        self._observer = Observer(self.layout, check_noise(noise, SensorNoise, "noise"), self.tasks)
+        self._observer = Observer(self.layout, self.tasks)
         self._episode_steps = round(number_in(episode_s, self.control_s, 1e6, "episode_s") * self.control_hz)
-        self._simulation = Simulation(self.gains, Realism(friction, payload_kg, action_delay_s))
-        self._estimator_noise = check_noise(estimator_noise, EstimatorNoise, "estimator_noise")
+        self._conditions = arguments.check_conditions(given, realism)
+        self._simulation = Simulation(self.gains, self._conditions.realism)
         self._make_expert = check_expert(expert)
         self._expert: Any = None
         self._renderer: Any = None
@@ -132,20 +132,16 @@ class Go1Env(gymnasium.Env):
         Raises:
             InvalidInputError: for an unknown option, task or impossible command; the running episode is left as it is.
         """
-        name, command = check_reset_options(options, self.tasks, self._arguments["task"])
+        name, command = arguments.check_reset_options(options, self.tasks, self._arguments["task"])
         super().reset(seed=seed)
         task = TASKS[name or str(self.np_random.choice(self.tasks))]
         drawn = task.draw_command(self.np_random)
-        self._episode = Episode(
-            task=task,
-            command=drawn if command is None else command,
-            last_action=self.action_map.from_radians(robot.HOME_POSE),
-            older_frames=deque(maxlen=self.layout.history - 1),
-        )
+        command = drawn if command is None else command
+        home = self.action_map.from_radians(robot.HOME_POSE)
+        self._episode = Episode(task, command, home, deque(maxlen=self.layout.history - 1))
         joint_noise = self.np_random.uniform(-RESET_JOINT_NOISE, RESET_JOINT_NOISE, 12)
+        self._conditions.begin(self._episode, self._simulation, self.np_random)
         self._simulation.reset(robot.HOME_POSE + joint_noise)
-        if self._estimator_noise is not None:
-            self._episode.estimator_error = EstimatorError(self._estimator_noise, int(self.np_random.integers(2**63)))
         if self._expert is not None:
             self._expert.reset(self.estimated_state)
         state = self.state
@@ -170,16 +166,7 @@ class Go1Env(gymnasium.Env):
         episode.advance(self.control_s)
         state = self.state
         ended = how_it_ended(state, self._simulation.stable, episode.steps >= self._episode_steps)
-        terms = reward_terms(
-            episode.task.reward,
-            episode.filtered_command,
-            state.base_velocity,
-            state.gravity_b,
-            float(state.position_w[2]),
-            self._simulation.torque,
-        )
-        if ended == "unstable":  # nothing measured means anything any more
-            terms = dict.fromkeys(terms, 0.0)
+        terms = episode.rewards(state, self._simulation.torque, ended)
         observation = self._observer.observe(self._simulation, state, episode, self.np_random)
         if self.render_mode == "human":
             self.render()
@@ -211,6 +198,21 @@ class Go1Env(gymnasium.Env):
     def task(self) -> Task:
         """The present task."""
         return self._running("task").task
+
+    @property
+    def requested_task(self) -> Task:
+        """The task that was asked for last; the present one unless `set_task` waits for the end of a flight."""
+        return self._running("requested_task").requested_task
+
+    @property
+    def command(self) -> np.ndarray:
+        """The command as asked for (vx [m/s], vy [m/s], yaw rate [rad/s]), shape (3,)."""
+        return self._running("command").command.copy()
+
+    @property
+    def realism(self) -> Realism:
+        """What is different about the physics now."""
+        return self._simulation.realism
 
     @property
     def simulation(self) -> Simulation:
@@ -249,7 +251,7 @@ class Go1Env(gymnasium.Env):
         episode = self._running("set_task")
         new = TASKS[one_of(task, self.tasks, "task")]
         new.check_command(episode.command)
-        episode.change_task(new, None if phase is None else check_phase(phase))
+        episode.change_task(new, None if phase is None else arguments.check_phase(phase))
 
     def set_command(self, command: Sequence[float]) -> None:
         """Ask for another (vx [m/s], vy [m/s], yaw rate [rad/s]); it is low-passed before expert and student see it.
@@ -258,7 +260,7 @@ class Go1Env(gymnasium.Env):
             InvalidInputError: if it is not three finite numbers within the task's `command_limit`.
         """
         episode = self._running("set_command")
-        episode.command = (episode.next_task or episode.task).check_command(command)
+        episode.command = episode.requested_task.check_command(command)
 
     def push(self, delta_velocity_w: Sequence[float]) -> None:
         """Kick the trunk: add to its linear velocity [m/s], world frame, shape (3,).
@@ -268,6 +270,11 @@ class Go1Env(gymnasium.Env):
         """
         self._running("push")
         self._simulation.push(finite_vector(delta_velocity_w, 3, "push (change of velocity)"))
+
+    def _running(self, what: str) -> Episode:
+        if self._episode is None:
+            raise ResetNeeded(f"call reset() before {what}")
+        return self._episode
 
     # -- Copies ------------------------------------------------------------------------------------------------------
 
@@ -290,10 +297,3 @@ class Go1Env(gymnasium.Env):
         self._np_random = state["np_random"]
         self._np_random_seed = state["np_random_seed"]
         self._episode = state["episode"]
-
-    # -- Parts of a step ---------------------------------------------------------------------------------------------
-
-    def _running(self, what: str) -> Episode:
-        if self._episode is None:
-            raise ResetNeeded(f"call reset() before {what}")
-        return self._episode

@@ -8,6 +8,8 @@ import numpy as np
 
 from go1_mtl_gym.clock import next_phase, passes
 from go1_mtl_gym.estimator import EstimatorError
+from go1_mtl_gym.observation import SensorNoise
+from go1_mtl_gym.rewards import reward_terms
 from go1_mtl_gym.state import RobotState
 from go1_mtl_gym.tasks import Task
 
@@ -46,6 +48,7 @@ class Episode:
         steps: control periods since the reset.
         time_s: since the reset [s].
         next_task: what will be asked for as soon as the present gait can be left, or None.
+        sensor_noise: what is added to the sensors' readings, or None.
         estimator_error: what the expert's state estimator gets wrong, or None for the true state.
     """
 
@@ -58,7 +61,13 @@ class Episode:
     steps: int = 0
     time_s: float = 0.0
     next_task: Task | None = None
+    sensor_noise: SensorNoise | None = None
     estimator_error: EstimatorError | None = None
+
+    @property
+    def requested_task(self) -> Task:
+        """What was asked for last: the present task, or the one that waits until the present gait can be left."""
+        return self.next_task or self.task
 
     def advance(self, control_s: float) -> None:
         """Let one control period [s] pass: clock and command filter move on.
@@ -88,6 +97,18 @@ class Episode:
     def estimated(self, state: RobotState) -> RobotState:
         """What the state estimator makes of the true state, now."""
         return state if self.estimator_error is None else self.estimator_error.estimate(state)
+
+    def rewards(self, state: RobotState, torque: np.ndarray, ended: str) -> dict[str, float]:
+        """The reward terms of the step that led to a state.
+
+        Args:
+            state: the true one, now.
+            torque: of the joints [N m], shape (12,).
+            ended: why the episode is over; after "unstable" nothing measured means anything and all terms are 0.
+        """
+        weights, height = self.task.reward, float(state.position_w[2])
+        terms = reward_terms(weights, self.filtered_command, state.base_velocity, state.gravity_b, height, torque)
+        return dict.fromkeys(terms, 0.0) if ended == "unstable" else terms
 
     def info(self, state: RobotState, terms: dict[str, float], ended: str) -> dict[str, Any]:
         """What `reset` and `step` report.

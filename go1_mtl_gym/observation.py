@@ -16,7 +16,7 @@
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from types import MappingProxyType
 
 import numpy as np
@@ -69,6 +69,14 @@ class SensorNoise:
     def __post_init__(self) -> None:
         for name in ("accelerometer", "gyroscope", "q", "dq", "gravity"):
             number_in(getattr(self, name), 0.0, 10.0, f"sensor noise of {name}")
+
+    def scaled(self, factor: float) -> "SensorNoise":
+        """The same with every standard deviation multiplied by a factor.
+
+        Raises:
+            InvalidInputError: if a figure then exceeds 10.
+        """
+        return SensorNoise(*(factor * deviation for deviation in astuple(self)))
 
     def apply(self, parts: dict[str, np.ndarray], rng: np.random.Generator) -> None:
         """Add noise to the readings in place, drawing in a fixed order."""

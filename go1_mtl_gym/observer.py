@@ -3,7 +3,7 @@
 import numpy as np
 
 from go1_mtl_gym.episode import Episode
-from go1_mtl_gym.observation import PROPRIOCEPTION, ObservationLayout, SensorNoise
+from go1_mtl_gym.observation import PROPRIOCEPTION, ObservationLayout
 from go1_mtl_gym.simulation import Simulation
 from go1_mtl_gym.state import RobotState
 
@@ -13,13 +13,11 @@ class Observer:
 
     Args:
         layout: which parts there are.
-        noise: of the sensors, or None.
         tasks: names in the order of the task id.
     """
 
-    def __init__(self, layout: ObservationLayout, noise: SensorNoise | None, tasks: tuple[str, ...]) -> None:
+    def __init__(self, layout: ObservationLayout, tasks: tuple[str, ...]) -> None:
         self._layout = layout
-        self._noise = noise
         self._tasks = tasks
 
     @staticmethod
@@ -48,7 +46,7 @@ class Observer:
         Args:
             simulation: whose sensors are read.
             state: the robot's state now.
-            episode: its present frame is added to `older_frames`.
+            episode: has the noise of the sensors; its present frame is added to `older_frames`.
             rng: of the noise.
         """
         reading = simulation.read()
@@ -64,8 +62,8 @@ class Observer:
             "phase": np.array([np.sin(turn), np.cos(turn)]),
             "last_action": episode.last_action,
         }
-        if self._noise is not None:
-            self._noise.apply(parts, rng)
+        if episode.sensor_noise is not None:
+            episode.sensor_noise.apply(parts, rng)
         if not simulation.stable:
             parts = {name: np.nan_to_num(part) for name, part in parts.items()}
         frame = np.concatenate([parts[name] for name in PROPRIOCEPTION])

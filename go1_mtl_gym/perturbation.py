@@ -1,4 +1,4 @@
-"""What makes demonstrations worth learning from: noise on actions, kicks, and commands that change."""
+"""What makes demonstrations worth learning from: noise on actions, kicks, and commands and tasks that change."""
 
 from typing import Any
 
@@ -6,7 +6,8 @@ import gymnasium
 import numpy as np
 
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.validation import finite_vector, number_in
+from go1_mtl_gym.tasks import TASKS, Task
+from go1_mtl_gym.validation import finite_vector, interval_s, number_in
 
 NOISE_CORRELATION_S = 0.1
 """Correlation time of the action noise [s]."""
@@ -15,11 +16,12 @@ NOISE_CORRELATION_S = 0.1
 class PerturbationWrapper(gymnasium.Wrapper):
     """Disturbs a Go1 so that its expert is seen recovering.
 
-    Three disturbances, each drawn from this wrapper's own generator (seeded by ``reset(seed=...)``):
+    Four disturbances, each drawn from this wrapper's own generator (seeded by ``reset(seed=...)``):
     first-order autoregressive noise on the executed action, its standard deviation drawn per episode from
     U(0, `noise_rad`); horizontal kicks of the trunk's velocity, uniform in a disc of radius `kick`, at exponentially
-    distributed times; and commands redrawn from the task's range. `expert_action` is untouched: it answers for the true
-    state, so the labels are clean.
+    distributed times; commands redrawn from the task's range; and changes to another of the environment's tasks, which
+    begin as `Go1Env.set_task` says. `expert_action` is untouched: it answers for the true state, so the labels are
+    clean.
 
     Args:
         env: a `Go1Env`, wrapped or not.
@@ -27,9 +29,13 @@ class PerturbationWrapper(gymnasium.Wrapper):
         kick: largest change of velocity [m/s].
         kick_interval: mean time between kicks [s].
         command_interval: shortest and longest time between commands [s], or None to leave the command alone.
+        corner_share: probability with which a redrawn command is a corner of the task's range, every component at plus
+            or minus its largest; the others are uniform. The command of a reset is the environment's own.
+        task_interval: shortest and longest time between changes of task [s], or None to leave the task alone. A command
+            beyond the new task's range is brought to its border.
 
     Raises:
-        InvalidInputError: if a figure is negative or not finite.
+        InvalidInputError: if a figure is negative or not finite, or tasks are to change where there is only one.
     """
 
     def __init__(
@@ -39,16 +45,18 @@ class PerturbationWrapper(gymnasium.Wrapper):
         kick: float = 0.2,
         kick_interval: float = 1.5,
         command_interval: tuple[float, float] | None = (1.5, 4.0),
+        corner_share: float = 0.0,
+        task_interval: tuple[float, float] | None = None,
     ) -> None:
         super().__init__(env)
         self._noise_rad = number_in(noise_rad, 0.0, 1.0, "noise_rad [rad]")
         self._kick = number_in(kick, 0.0, 5.0, "kick [m/s]")
         self._kick_interval = number_in(kick_interval, 0.01, 1e6, "kick_interval [s]")
-        self._command_interval = command_interval
-        if command_interval is not None:
-            low, high = finite_vector(command_interval, 2, "command_interval [s]")
-            if not 0 < low <= high:
-                raise InvalidInputError(f"command_interval must be 0 < shortest <= longest, got {command_interval}")
+        self._command_interval = interval_s(command_interval, "command_interval")
+        self._corner_share = number_in(corner_share, 0.0, 1.0, "corner_share")
+        self._task_interval = interval_s(task_interval, "task_interval")
+        if task_interval is not None and len(env.unwrapped.tasks) < 2:
+            raise InvalidInputError(f"task_interval must be None for an environment of one task, got {task_interval}")
         self._rng = np.random.default_rng()
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[np.ndarray, dict]:
@@ -59,7 +67,8 @@ class PerturbationWrapper(gymnasium.Wrapper):
         self._sigma = self._rng.uniform(0.0, self._noise_rad) / self.env.unwrapped.action_map.half_range
         self._noise = self._sigma * self._rng.standard_normal(12)
         self._next_kick = self._rng.exponential(self._kick_interval)
-        self._next_command = self._draw_command_time()
+        self._next_command = self._draw_time(self._command_interval)
+        self._next_task = self._draw_time(self._task_interval)
         self._time = 0.0
         return result
 
@@ -78,12 +87,28 @@ class PerturbationWrapper(gymnasium.Wrapper):
             self._next_kick = self._time + self._rng.exponential(self._kick_interval)
             size, angle = self._kick * np.sqrt(self._rng.uniform()), self._rng.uniform(0.0, 2 * np.pi)
             env.push([size * np.cos(angle), size * np.sin(angle), 0.0])
+        if self._time >= self._next_task:
+            self._next_task = self._time + self._draw_time(self._task_interval)
+            self._change_task()
         if self._time >= self._next_command:
-            self._next_command = self._time + self._draw_command_time()
-            env.set_command(env.task.draw_command(self._rng))
+            self._next_command = self._time + self._draw_time(self._command_interval)
+            env.set_command(self._draw_command(env.requested_task))
         executed = np.clip(action + self._noise, -1.0, 1.0).astype(np.float32)
         observation, reward, terminated, truncated, info = self.env.step(executed)
         return observation, reward, terminated, truncated, info | {"executed_action": executed}
 
-    def _draw_command_time(self) -> float:
-        return np.inf if self._command_interval is None else self._rng.uniform(*self._command_interval)
+    def _change_task(self) -> None:
+        """Ask for another task than the one that was asked for last."""
+        env = self.env.unwrapped
+        name = str(self._rng.choice([name for name in env.tasks if name != env.requested_task.name]))
+        span = np.array(TASKS[name].command_range)
+        env.set_command(np.clip(env.command, -span, span))
+        env.set_task(name)
+
+    def _draw_command(self, task: Task) -> np.ndarray:
+        if self._corner_share > 0 and self._rng.uniform() < self._corner_share:
+            return self._rng.choice([-1.0, 1.0], 3) * np.array(task.command_range)
+        return task.draw_command(self._rng)
+
+    def _draw_time(self, interval: tuple[float, float] | None) -> float:
+        return np.inf if interval is None else self._rng.uniform(*interval)

@@ -1,15 +1,39 @@
-"""Ways in which a real robot differs from the model that its expert has in mind: friction, payload, delay."""
+"""Ways in which a real robot differs from the model that its expert has in mind: mass, motors, contacts, delay."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import astuple, dataclass, fields
 
 import mujoco
 import numpy as np
 
+from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PHYSICS_HZ
 from go1_mtl_gym.validation import number_in
 
 PAYLOAD_SIDE = 0.1
 """Side of the cube that the payload is [m]."""
+INERTIAL_ARRAYS = ("body_mass", "body_inertia", "dof_armature")
+"""Those arrays of a model after whose change `mj_setConst` is due."""
+CHANGED_ARRAYS = (
+    *INERTIAL_ARRAYS,
+    "geom_friction",
+    "geom_solref",
+    "dof_frictionloss",
+    "actuator_gainprm",
+    "actuator_biasprm",
+    "actuator_forcerange",
+)
+"""The arrays of a model that `Realism.apply` writes to."""
+_NONE = -1.0
+_ALLOWED = {
+    "friction": (0.05, 2.0, ""),
+    "payload_kg": (0.0, 10.0, " [kg]"),
+    "action_delay_s": (0.0, 0.05, " [s]"),
+    "motor_strength": (0.5, 1.5, ""),
+    "joint_friction": (0.0, 5.0, " [N m]"),
+    "rotor_inertia": (0.0, 0.1, " [kg m^2]"),
+    "contact_time_s": (0.002, 0.1, " [s]"),
+}
 
 
 @dataclass(frozen=True)
@@ -20,6 +44,10 @@ class Realism:
         friction: coefficient of sliding friction between robot and ground, or None for the model's own.
         payload_kg: mass of a cube fixed at the trunk's centre of mass [kg].
         action_delay_s: time after which a joint target takes effect [s], rounded to milliseconds.
+        motor_strength: factor on the actuators' torques and on their limits.
+        joint_friction: dry friction of every joint [N m], or None for the model's own.
+        rotor_inertia: of every motor, as its joint feels it [kg m^2], or None for the model's own.
+        contact_time_s: time constant of the contacts of the feet [s], small is stiff; None for the model's own.
 
     Raises:
         InvalidInputError: if a figure is outside its range.
@@ -28,32 +56,52 @@ class Realism:
     friction: float | None = None
     payload_kg: float = 0.0
     action_delay_s: float = 0.0
+    motor_strength: float = 1.0
+    joint_friction: float | None = None
+    rotor_inertia: float | None = None
+    contact_time_s: float | None = None
 
     def __post_init__(self) -> None:
-        if self.friction is not None:
-            number_in(self.friction, 0.05, 2.0, "friction")
-        number_in(self.payload_kg, 0.0, 10.0, "payload_kg [kg]")
-        number_in(self.action_delay_s, 0.0, 0.05, "action_delay_s [s]")
+        for each in fields(self):
+            value, (low, high, unit) = getattr(self, each.name), _ALLOWED[each.name]
+            if value is not None or each.default is not None:
+                number_in(value, low, high, each.name + unit)
 
     @property
     def delay_steps(self) -> int:
         """The delay in physics steps."""
         return round(self.action_delay_s * PHYSICS_HZ)
 
+    def as_vector(self) -> np.ndarray:
+        """All figures in their order, shape (7,); None is -1."""
+        return np.array([_NONE if value is None else value for value in astuple(self)], dtype=np.float64)
+
+    @classmethod
+    def from_vector(cls, vector: Sequence[float]) -> "Realism":
+        """The inverse of `as_vector`."""
+        return cls(*(None if value == _NONE else float(value) for value in vector))
+
     def apply(self, model: mujoco.MjModel) -> None:
-        """Change friction and masses of a model.
+        """Change a model whose PD gains are set already; `mj_setConst` is left to the caller.
 
         A contact takes the friction of the geom of higher priority, and the larger one of two equals: only if all
-        geoms have one coefficient is it the contact's. A cube of mass m and side s has the inertia m s^2 / 6 about
-        every axis through its centre.
+        geoms have one coefficient is it the contact's. The feet have the higher priority, so that the time constant
+        of theirs is the contact's on any floor. A cube of mass m and side s has the inertia m s^2 / 6 about every axis
+        through its centre. The first six degrees of freedom are the trunk's.
         """
         if self.friction is not None:
             model.geom_friction[:, 0] = self.friction
-        if self.payload_kg > 0:
-            trunk = model.body("trunk").id
-            model.body_mass[trunk] += self.payload_kg
-            model.body_inertia[trunk] += self.payload_kg * PAYLOAD_SIDE**2 / 6
-            mujoco.mj_setConst(model, mujoco.MjData(model))
+        trunk = model.body("trunk").id
+        model.body_mass[trunk] += self.payload_kg
+        model.body_inertia[trunk] += self.payload_kg * PAYLOAD_SIDE**2 / 6
+        for array in (model.actuator_gainprm, model.actuator_biasprm, model.actuator_forcerange):
+            array *= self.motor_strength
+        if self.joint_friction is not None:
+            model.dof_frictionloss[6:] = self.joint_friction
+        if self.rotor_inertia is not None:
+            model.dof_armature[6:] = self.rotor_inertia
+        if self.contact_time_s is not None:
+            model.geom_solref[[model.geom(f"{leg}_foot").id for leg in robot.LEGS], 0] = self.contact_time_s
 
 
 class ActionDelay:

@@ -7,7 +7,7 @@ import numpy as np
 
 from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PHYSICS_HZ, PDGains
-from go1_mtl_gym.realism import ActionDelay, Realism
+from go1_mtl_gym.realism import CHANGED_ARRAYS, INERTIAL_ARRAYS, ActionDelay, Realism
 
 CONTACT_FORCE = 2.0
 """A foot counts as on the ground when it presses with more than this [N]."""
@@ -33,20 +33,20 @@ class Simulation:
 
     Attributes:
         model: the MuJoCo model; private to this simulation, so it may be changed (friction, masses). Copies of an
-            environment begin with the unchanged model.
+            environment begin with the unchanged model, and `set_realism` overwrites what it is about.
         data: the MuJoCo data.
+        realism: what is different about the physics now.
     """
 
     def __init__(self, gains: PDGains, realism: Realism | None = None) -> None:
-        realism = realism or Realism()
         self.model = mujoco.MjModel.from_xml_path(robot.SCENE_PATH)
-        realism.apply(self.model)
         self.data = mujoco.MjData(self.model)
-        self._delay = ActionDelay(realism.delay_steps)
         self.model.opt.timestep = 1.0 / PHYSICS_HZ
         self.model.actuator_gainprm[:, 0] = gains.kp
         self.model.actuator_biasprm[:, 1] = -gains.kp
         self.model.actuator_biasprm[:, 2] = -gains.kd
+        self._plain = {name: getattr(self.model, name).copy() for name in CHANGED_ARRAYS}
+        self.set_realism(realism or Realism())
         self._sensor = {
             name: slice(start, start + size)
             for name, start, size in (
@@ -72,6 +72,22 @@ class Simulation:
         mujoco.mj_kinematics(self.model, self.data)
         self.data.qpos[2] -= self.feet_w[:, 2].min() - robot.FOOT_RADIUS
         mujoco.mj_forward(self.model, self.data)
+
+    def set_realism(self, realism: Realism) -> None:
+        """Let something else be different about the physics, from the next step on.
+
+        The figures are those of the model on disk, changed by `realism` alone. Targets on their way are forgotten: the
+        actuators go on holding what they hold.
+        """
+        before = [getattr(self.model, name).copy() for name in INERTIAL_ARRAYS]
+        for name, value in self._plain.items():
+            getattr(self.model, name)[:] = value
+        realism.apply(self.model)
+        if not all(np.array_equal(getattr(self.model, name), old) for name, old in zip(INERTIAL_ARRAYS, before)):
+            mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
+        self._delay = ActionDelay(realism.delay_steps)
+        self._delay.reset(self.data.ctrl)
+        self.realism = realism
 
     def step(self, target: np.ndarray, physics_steps: int) -> None:
         """Command joint targets [rad], shape (12,), for a number of 1 ms steps; the delay decides when they are held.
@@ -130,14 +146,17 @@ class Simulation:
         )
 
     def snapshot(self) -> np.ndarray:
-        """Everything needed to continue to the bit, as one vector: MuJoCo's state, then the targets on their way."""
+        """Everything needed to continue to the bit, as one vector: state, targets on their way, realism."""
         state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
         mujoco.mj_getState(self.model, self.data, state, _STATE)
-        return np.concatenate([state, self._delay.waiting.ravel()])
+        return np.concatenate([state, self._delay.waiting.ravel(), self.realism.as_vector()])
 
     def restore(self, snapshot: np.ndarray) -> None:
-        """Return to a snapshot of a simulation of the same model and delay."""
-        state, waiting = np.split(snapshot, [mujoco.mj_stateSize(self.model, _STATE)])
+        """Return to a snapshot of a simulation with the same gains; its realism comes with it."""
+        size = mujoco.mj_stateSize(self.model, _STATE)
+        state, waiting, realism = np.split(snapshot, [size, len(snapshot) - len(self.realism.as_vector())])
+        if Realism.from_vector(realism) != self.realism:
+            self.set_realism(Realism.from_vector(realism))
         mujoco.mj_setState(self.model, self.data, state, _STATE)
         mujoco.mj_forward(self.model, self.data)
         mujoco.mj_setState(self.model, self.data, state, _STATE)

@@ -30,6 +30,20 @@ def finite_vector(value: object, size: int, what: str) -> np.ndarray:
     return vector
 
 
+def interval_s(value: object, what: str) -> tuple[float, float] | None:
+    """Return `value` as a shortest and a longest time [s]; None stays None.
+
+    Raises:
+        InvalidInputError: if it is not 0 < shortest <= longest.
+    """
+    if value is None:
+        return None
+    shortest, longest = finite_vector(value, 2, f"{what} [s]").tolist()
+    if not 0 < shortest <= longest:
+        raise InvalidInputError(f"{what} must be 0 < shortest <= longest, got {(shortest, longest)}")
+    return shortest, longest
+
+
 def number_in(value: object, low: float, high: float, what: str) -> float:
     """Return `value` as a float in [low, high].
 

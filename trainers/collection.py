@@ -36,11 +36,12 @@ class CollectJob:
     """Description of one shard; equal descriptions give equal rows.
 
     Attributes:
-        task: name of the task.
+        task: name of the task that every episode begins in.
         seed: of everything random.
         seconds: duration of the kept rows [s].
         command: (vx [m/s], vy [m/s], yaw rate [rad/s]) of every episode, or None to draw one per episode.
-        perturbation: disturbances, or None for the clean expert. With a `command` given, commands are not redrawn.
+        perturbation: disturbances, or None for the clean expert. With a `command` given, commands are not redrawn. With
+            a `task_interval`, rows of all the environment's tasks follow one another.
         env_kwargs: of the environment.
 
     Raises:

@@ -11,6 +11,7 @@ import numpy as np
 
 import go1_mtl_gym
 from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.validation import interval_s, number_in
 
 EnvFactory = Callable[..., gymnasium.Env]
 """What `make_env` is: (task, perturbation=None, **env_kwargs) -> environment with a method ``expert_action``."""
@@ -25,23 +26,26 @@ class PerturbationConfig:
         kick: largest velocity kick [m/s].
         kick_interval: mean time between kicks [s].
         command_interval: shortest and longest time between new commands [s], or None for one command per episode.
+        corner_share: probability with which a new command is a corner of the task's range.
+        task_interval: shortest and longest time between changes of task [s], or None for one task per episode.
 
     Raises:
-        InvalidInputError: if a figure is negative, or the interval is not 0 < shortest <= longest.
+        InvalidInputError: if a figure is negative, or an interval is not 0 < shortest <= longest.
     """
 
     noise_rad: float = 0.06
     kick: float = 0.2
     kick_interval: float = 1.5
     command_interval: tuple[float, float] | None = (1.5, 4.0)
+    corner_share: float = 0.0
+    task_interval: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         if not (self.noise_rad >= 0 and self.kick >= 0 and self.kick_interval > 0):
             raise InvalidInputError(f"noise_rad and kick must be >= 0 and kick_interval > 0, got {self}")
-        if self.command_interval is not None:
-            object.__setattr__(self, "command_interval", tuple(self.command_interval))
-            if len(self.command_interval) != 2 or not 0 < self.command_interval[0] <= self.command_interval[1]:
-                raise InvalidInputError(f"command_interval must be 0 < shortest <= longest, got {self}")
+        number_in(self.corner_share, 0.0, 1.0, "corner_share")
+        for name in ("command_interval", "task_interval"):
+            object.__setattr__(self, name, interval_s(getattr(self, name), name))
 
 
 class ExpertAccess(gymnasium.Wrapper):

@@ -14,10 +14,11 @@ KWARGS = [
     {"channels": ("command", "gravity", "phase", "last_action"), "history": 3},
     {"noise": True, "control_hz": 100, "kp": 30.0, "kd": 1.0},
     {"friction": 0.5, "payload_kg": 2.0, "action_delay_s": 0.025, "estimator_noise": True},
+    {"randomization": True},
 ]
 
 
-@pytest.mark.parametrize("kwargs", KWARGS, ids=["plain", "channels", "noise", "real"])
+@pytest.mark.parametrize("kwargs", KWARGS, ids=["plain", "channels", "noise", "real", "random"])
 @pytest.mark.parametrize("task", [None, *TASKS])
 def test_both_checkers_pass_without_a_warning(task, kwargs):
     env = gymnasium.make(env_id(task), disable_env_checker=True, **kwargs)

@@ -12,6 +12,7 @@ COPIERS = pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda env: pickl
                                   ids=["deepcopy", "pickle"])  # fmt: skip
 
 REAL = {"friction": 0.6, "payload_kg": 1.0, "action_delay_s": 0.025, "estimator_noise": True}
+RANDOM = {"randomization": True, "estimator_noise": True}
 
 
 def walking(steps: int, **kwargs) -> Go1Env:
@@ -41,7 +42,8 @@ def agree(one: Go1Env, two: Go1Env, steps: int, rng_seed: int = 0) -> None:
 
 
 @COPIERS
-@pytest.mark.parametrize("kwargs", [{}, {"noise": True, "control_hz": 100}, REAL], ids=["exact", "noisy", "real"])
+@pytest.mark.parametrize("kwargs", [{}, {"noise": True, "control_hz": 100}, REAL, RANDOM],
+                         ids=["exact", "noisy", "real", "random"])  # fmt: skip
 def test_a_copy_in_the_middle_of_an_episode_continues_to_the_bit(duplicate, kwargs):
     env = walking(20, **kwargs)
     agree(env, duplicate(env), 30)

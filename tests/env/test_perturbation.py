@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from experts import NMPCExpert
-from go1_mtl_gym import PerturbationWrapper, robot
+from go1_mtl_gym import GAITS, TASKS, PerturbationWrapper, Task, register_task, robot
 from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.perturbation import NOISE_CORRELATION_S
@@ -115,6 +115,123 @@ def test_commands_change_within_their_interval_and_range():
     assert len(gaps) > 14 and gaps.min() >= 0.2 - 1e-9 and gaps.max() <= 0.42 + 1e-9
 
 
+# -- Corners and changes of task ---------------------------------------------------------------------------------------
+
+
+def multi_gait(**kwargs) -> PerturbationWrapper:
+    return PerturbationWrapper(Go1Env("trot"), **(QUIET | kwargs))
+
+
+def commands(env: PerturbationWrapper, steps: int, monkeypatch) -> np.ndarray:
+    """Every redrawn command of a run without physics, shape (n, 3)."""
+    monkeypatch.setattr(env.unwrapped.simulation, "step", lambda target, steps: None)
+    seen = [env.reset(seed=0)[1]["command"]]
+    for _ in range(steps):
+        command = env.step(home(env))[4]["command"]
+        if (command != seen[-1]).any():
+            seen.append(command)
+    return np.array(seen[1:])
+
+
+def test_a_share_of_the_commands_are_corners(monkeypatch):
+    env = wrapped(command_interval=(0.02, 0.02), corner_share=0.3)
+    levels = commands(env, 1400, monkeypatch) / np.array(TASKS["trot"].command_range)
+    corners = (np.abs(levels) == 1.0).all(axis=1)
+    assert corners.mean() == pytest.approx(0.3, abs=0.05)
+    assert len(np.unique(levels[corners], axis=0)) == 8, "all of them"
+    assert (np.abs(levels[~corners]) < 1.0).all() and np.std(levels[~corners]) == pytest.approx(3**-0.5, rel=0.05)
+
+
+def test_every_command_can_be_a_corner(monkeypatch):
+    levels = commands(wrapped(command_interval=(0.02, 0.02), corner_share=1.0), 50, monkeypatch)
+    assert (np.abs(levels) == TASKS["trot"].command_range).all()
+
+
+def changes(env: PerturbationWrapper, steps: int, monkeypatch, seed: int = 0) -> list[tuple[int, str]]:
+    """What tasks are asked for in a run without physics, and in which steps."""
+    monkeypatch.setattr(env.unwrapped.simulation, "step", lambda target, steps: None)
+    env.reset(seed=seed)
+    set_task, step, asked = env.unwrapped.set_task, 0, []
+    monkeypatch.setattr(env.unwrapped, "set_task", lambda name: (asked.append((step, name)), set_task(name)))
+    for step in range(1, steps + 1):  # noqa: B007 - the lambda reads it
+        env.step(home(env))
+    return asked
+
+
+def test_tasks_change_within_their_interval_to_any_other(monkeypatch):
+    asked = changes(multi_gait(task_interval=(0.2, 0.4)), 3000, monkeypatch)
+    steps, names = zip(*asked)
+    gaps = np.diff((0, *steps))
+    assert gaps.min() >= 10 and gaps.max() <= 21 and len(asked) > 150
+    assert all(one != other for one, other in zip(("trot", *names), names))
+    counts = np.array([names.count(name) for name in TASKS])
+    assert counts.min() > 0.6 * len(names) / len(TASKS)
+
+
+def test_one_seed_changes_the_same_tasks_and_another_others(monkeypatch):
+    runs = [changes(multi_gait(task_interval=(0.2, 0.4)), 300, monkeypatch, seed) for seed in (1, 1, 2)]
+    assert runs[0] == runs[1] != runs[2]
+
+
+def test_a_command_beyond_the_new_tasks_range_goes_to_its_border(monkeypatch):
+    env = multi_gait(task_interval=(0.1, 0.1))
+    monkeypatch.setattr(env.unwrapped.simulation, "step", lambda target, steps: None)
+    env.reset(seed=0, options={"command": (1.9, -1.0, 0.4)})  # walk accepts 1.1, -0.9
+    for _ in range(5):
+        *_, info = env.step(home(env))
+        assert (info["command"] == (1.9, -1.0, 0.4)).all() == (info["task"] == "trot")
+    span = TASKS[info["task"]].command_range
+    assert info["task"] != "trot" and info["command"].tolist() == [span[0], -span[1], 0.4]
+
+
+def test_commands_come_from_the_range_of_the_task_asked_for(monkeypatch, passing_tasks):
+    register_task(Task("creep", GAITS["walk"], command_range=(0.1, 0.0, 0.0), command_limit=(0.1, 0.0, 0.0)))
+    env = PerturbationWrapper(
+        Go1Env("jump", tasks=("jump", "creep", "trot")),
+        **(QUIET | {"task_interval": (0.06, 0.3), "command_interval": (0.04, 0.1)}),
+    )
+    monkeypatch.setattr(env.unwrapped.simulation, "step", lambda target, steps: None)
+    env.reset(seed=0)
+    waited, largest = False, 0.0
+    for _ in range(600):
+        env.step(home(env))
+        command, asked = env.unwrapped.command, env.unwrapped.requested_task
+        assert (np.abs(command) <= asked.command_range).all()
+        waited |= asked.name == "creep" and env.unwrapped.task.name == "jump"
+        largest = max(largest, abs(command[0]))
+    assert waited, "the jump was not left at once"
+    assert largest > 0.7, "the trot's own range is drawn from"
+
+
+def test_without_corners_and_changes_of_task_the_stream_of_draws_is_this():
+    env = wrapped(command_interval=(0.1, 0.2))
+    env.reset(seed=4)
+    rng = np.random.default_rng([4, 0x9E3779B9])
+    rng.uniform(), rng.standard_normal(12), rng.exponential()  # size of the noise, its beginning, the first kick
+    steps = int(np.ceil(rng.uniform(0.1, 0.2) / 0.02))
+    for _ in range(steps):
+        rng.standard_normal(12)
+        *_, info = env.step(home(env))
+    rng.uniform()  # the time of the next command
+    np.testing.assert_array_equal(info["command"], TASKS["trot"].draw_command(rng))
+
+
+def test_the_expert_survives_changes_of_task_and_corners():
+    env = PerturbationWrapper(Go1Env(None), task_interval=(0.3, 0.8), command_interval=(0.3, 0.8), corner_share=0.5)
+    _, info = env.reset(seed=0)
+    seen = {info["task"]}
+    for _ in range(200):
+        *_, terminated, _, info = env.step(env.unwrapped.expert_action())
+        assert not terminated
+        seen.add(info["task"])
+    assert len(seen) >= 4
+
+
+def test_one_task_cannot_change():
+    with pytest.raises(InvalidInputError, match=r"task_interval must be None for an environment of one task.*\(1, 2\)"):
+        PerturbationWrapper(Go1Env("trot", tasks=("trot",)), task_interval=(1, 2))
+
+
 def test_labels_are_the_experts_answer_for_the_true_state():
     env = PerturbationWrapper(Go1Env("trot"), noise_rad=0.06, kick=0.2, kick_interval=0.1)
     env.reset(seed=5)
@@ -145,6 +262,9 @@ def test_executed_actions_stay_in_the_action_space():
         ({"command_interval": (0.0, 1.0)}, "command_interval"),
         ({"command_interval": (1.0,)}, r"command_interval.*shape \(2,\)"),
         ({"command_interval": (1.0, float("inf"))}, "command_interval.*finite"),
+        ({"corner_share": 1.5}, r"corner_share must lie in \[0, 1\], got 1.5"),
+        ({"task_interval": (2.0, 1.0)}, "task_interval must be 0 < shortest <= longest, got"),
+        ({"task_interval": (-1.0, 1.0)}, "task_interval"),
     ],
 )
 def test_impossible_figures_are_refused(figures, words):

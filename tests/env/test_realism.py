@@ -1,4 +1,4 @@
-"""Friction, payload and delay: each changes what it says, exactly, and nothing else."""
+"""Friction, payload, motors, contacts and delay: each changes what it says, exactly, and nothing else."""
 
 import mujoco
 import numpy as np
@@ -88,6 +88,90 @@ def test_the_feet_bear_the_payload():
     assert weight == pytest.approx((robot.MASS + 3.0) * robot.GRAVITY, rel=0.01)
 
 
+# -- Motors and joints -------------------------------------------------------------------------------------------------
+
+INERTIA = {"body_invweight0", "dof_invweight0", "dof_M0", "actuator_acc0"}
+"""What follows from a model's inertias without a change of its masses."""
+
+
+def torque(error: float, realism: Realism) -> np.ndarray:
+    """Torques of a resting robot whose joints all miss their targets by an error [rad]."""
+    simulation = Simulation(PDGains(), realism)
+    simulation.reset(robot.HOME_POSE)
+    simulation.data.ctrl[:] = robot.HOME_POSE + error
+    mujoco.mj_forward(simulation.model, simulation.data)
+    return simulation.torque
+
+
+@pytest.mark.parametrize("strength", [0.5, 0.9, 1.5])
+def test_motor_strength_scales_torques_and_their_limits(strength):
+    np.testing.assert_allclose(torque(0.1, Realism(motor_strength=strength)), strength * 5.0)  # 50 N m/rad
+    np.testing.assert_allclose(torque(9.0, Realism(motor_strength=strength)), strength * robot.TORQUE_LIMIT)
+
+
+def test_motor_strength_scales_the_damping():
+    simulation = Simulation(PDGains(50.0, 2.0), Realism(motor_strength=0.8))
+    simulation.reset(robot.HOME_POSE)
+    simulation.data.qvel[6:] = 1.0
+    mujoco.mj_forward(simulation.model, simulation.data)
+    np.testing.assert_allclose(simulation.torque, -0.8 * 2.0)
+
+
+def test_motor_strength_changes_nothing_else():
+    arrays = {"actuator_gainprm", "actuator_biasprm", "actuator_forcerange"}
+    assert changed(Realism(motor_strength=0.9)) == arrays
+
+
+def test_dry_friction_is_that_of_every_joint_and_of_nothing_else():
+    assert changed(Realism(joint_friction=0.7)) == {"dof_frictionloss"}
+    model = Simulation(PDGains(), Realism(joint_friction=0.7)).model
+    assert model.dof_frictionloss.tolist() == [0.0] * 6 + [0.7] * 12
+    assert not Simulation(PDGains(), Realism(joint_friction=0.0)).model.dof_frictionloss.any()
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.4, 3.0])
+def test_dry_friction_brakes_a_turning_joint_whatever_its_speed(friction):
+    simulation = Simulation(PDGains(), Realism(joint_friction=friction))
+    simulation.reset(robot.HOME_POSE)
+    simulation.data.qpos[2] = 2.0  # in the air
+    simulation.model.actuator_biasprm[:] = simulation.model.actuator_gainprm[:] = 0.0  # limp
+    for speed in (5.0, -15.0):
+        simulation.data.qvel[6] = speed
+        mujoco.mj_forward(simulation.model, simulation.data)
+        assert simulation.data.qfrc_constraint[6] == pytest.approx(-np.sign(speed) * friction)
+
+
+def test_rotor_inertia_is_that_of_every_joint_and_what_follows_alone():
+    assert changed(Realism(rotor_inertia=0.03)) == {"dof_armature"} | INERTIA
+    model = Simulation(PDGains(), Realism(rotor_inertia=0.03)).model
+    assert model.dof_armature.tolist() == [0.0] * 6 + [0.03] * 12
+    more = model.dof_M0 - Simulation(PDGains(), Realism(rotor_inertia=0.01)).model.dof_M0
+    np.testing.assert_allclose(more, [0.0] * 6 + [0.02] * 12, atol=1e-12)
+
+
+# -- Contacts ----------------------------------------------------------------------------------------------------------
+
+
+def test_the_contact_time_is_that_of_the_feet_alone():
+    assert changed(Realism(contact_time_s=0.01)) == {"geom_solref"}
+    model = Simulation(PDGains(), Realism(contact_time_s=0.01)).model
+    feet = [model.geom(f"{leg}_foot").id for leg in robot.LEGS]
+    assert model.geom_solref[feet].tolist() == [[0.01, 1.0]] * 4
+    assert (np.delete(model.geom_solref, feet, axis=0) == [0.02, 1.0]).all()
+
+
+def test_contacts_of_the_feet_have_the_feets_time_and_soft_ones_sink_in():
+    depth = {}
+    for time_s in (0.005, 0.02, 0.04):
+        simulation = Simulation(PDGains(), Realism(contact_time_s=time_s))
+        simulation.reset(robot.HOME_POSE)
+        simulation.step(robot.HOME_POSE, 1000)
+        contacts = simulation.data.contact
+        assert len(contacts) == 4 and (contacts.solref[:, 0] == time_s).all()
+        depth[time_s] = -contacts.dist.mean()
+    assert 2e-5 < depth[0.005] < depth[0.02] / 3 and depth[0.02] < depth[0.04] / 1.5
+
+
 # -- Delay -------------------------------------------------------------------------------------------------------------
 
 
@@ -156,6 +240,12 @@ def test_a_reset_forgets_the_targets_on_their_way():
         ({"payload_kg": None}, "payload_kg.*None"),
         ({"action_delay_s": 0.06}, r"action_delay_s \[s\] must lie in \[0, 0.05\], got 0.06"),
         ({"action_delay_s": float("nan")}, "action_delay_s.*nan"),
+        ({"motor_strength": 0.4}, r"motor_strength must lie in \[0.5, 1.5\], got 0.4"),
+        ({"motor_strength": None}, "motor_strength.*None"),
+        ({"joint_friction": -0.1}, r"joint_friction \[N m\] must lie in \[0, 5\], got -0.1"),
+        ({"rotor_inertia": 1.0}, r"rotor_inertia \[kg m\^2\] must lie in \[0, 0.1\], got 1"),
+        ({"contact_time_s": 0.001}, r"contact_time_s \[s\] must lie in \[0.002, 0.1\], got 0.001"),
+        ({"gravity": 1.6}, "argument of Go1Env must be one of 'task', .*'kp'.*'friction'.*; got 'gravity'"),
         ({"estimator_noise": 0.1}, "estimator_noise must be None, True, False or an EstimatorNoise, got 0.1"),
     ],
 )

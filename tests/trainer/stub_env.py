@@ -10,7 +10,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from go1_mtl_gym import PAPER_TASKS, TASKS, PerturbationWrapper
+from go1_mtl_gym import PAPER_TASKS, TASKS, PerturbationWrapper, Task
 from go1_mtl_gym.actuation import ActionMap
 from trainers.environments import ExpertAccess, PerturbationConfig
 
@@ -51,7 +51,7 @@ class StubEnv(gymnasium.Env):
         **_: Any,
     ) -> None:
         self.tasks, self.control_hz, self.control_s = tuple(tasks), control_hz, 1 / control_hz
-        self.task = TASKS[task]
+        self.first_task = self.task = TASKS[task]
         self.observation_space = gymnasium.spaces.Box(-50, 50, (SIZE + len(tasks),), np.float32)
         self.action_space = gymnasium.spaces.Box(-1, 1, (12,), np.float32)
         self.action_map = ActionMap(center=np.tile([0.0, 0.9, -1.8], 4), half_range=np.linspace(0.5, 1.6, 12))
@@ -61,7 +61,7 @@ class StubEnv(gymnasium.Env):
 
     def reset(self, *, seed=None, options=None):
         super().reset(seed=seed)
-        options = options or {}
+        options, self.task = options or {}, self.first_task
         drawn = self.task.draw_command(self.np_random)
         self.command = np.array(options.get("command", drawn), dtype=float)
         self.filtered = np.zeros(3)
@@ -79,6 +79,13 @@ class StubEnv(gymnasium.Env):
         if self.steps * self.control_s >= self.falls_after:
             action[2] = 1.0
         return action.astype(np.float32)
+
+    @property
+    def requested_task(self) -> Task:
+        return self.task
+
+    def set_task(self, task: str) -> None:
+        self.task, self.phase = TASKS[task], 0.0
 
     def set_command(self, command) -> None:
         self.command = np.array(command, dtype=float)

@@ -1,12 +1,14 @@
 """Collecting demonstrations: right labels, pure, resumable."""
 
 import dataclasses
+import json
 import subprocess
 import sys
 
 import numpy as np
 import pytest
 
+from go1_mtl_gym import TASKS, DomainRandomization
 from go1_mtl_gym.errors import InvalidInputError
 from tests.trainer.stub_env import HIPS, THIGHS, StubEnv, make_stub
 from trainers import CollectJob, Demonstrations, PerturbationConfig, ShardMismatchError, collect, collect_all
@@ -47,6 +49,36 @@ def test_command_is_kept_even_when_perturbed():
     perturbation = PerturbationConfig(command_interval=(0.2, 0.3))
     demos = collect("trot", (0.5, 0.0, 0.0), 0, 10.0, perturbation, make_env=make_stub)
     np.testing.assert_allclose(demos.obs[-1, LAYOUT["command"]], [0.5, 0, 0], atol=1e-3)
+
+
+def test_rows_of_several_tasks_when_the_task_changes():
+    perturbation = PerturbationConfig(task_interval=(0.5, 1.0))
+    demos = collect("walk", seed=3, seconds=20.0, perturbation=perturbation, make_env=make_stub)
+    assert set(demos.task) == {0, 1, 2, 3} and demos.tasks[demos.task[0]] == "walk"
+    stays = np.diff(np.flatnonzero(np.diff(demos.task)))
+    assert stays.min() >= 25 and stays.max() <= 51
+    again = collect("walk", seed=3, seconds=20.0, perturbation=perturbation, make_env=make_stub)
+    np.testing.assert_array_equal(demos.obs, again.obs)
+
+
+def test_the_go1s_rows_of_several_tasks_have_the_new_tasks_labels():
+    perturbation = PerturbationConfig(task_interval=(0.3, 0.6), corner_share=0.5, command_interval=(0.2, 0.4))
+    kwargs = {"tasks": ("trot", "jump", "walk"), "channels": ("command", "phase"), "randomization": True}
+    demos = collect("jump", None, 1, 3.0, perturbation, kwargs)
+    assert len(demos) == 150 and set(demos.task) == {0, 1, 2} and demos.tasks[demos.task[0]] == "jump"
+    spans = np.array([TASKS[name].command_range for name in demos.tasks])
+    assert (np.abs(demos.obs[:, LAYOUT["command"]]) <= spans.max(axis=0)).all()
+    assert json.loads(json.dumps(demos.meta["job"])) == demos.meta["job"]
+
+
+def test_a_job_with_a_randomization_of_ones_own_is_found_again(tmp_path):
+    kwargs = {"randomization": DomainRandomization(friction=(0.5, 0.6))}
+    job = CollectJob("trot", 0, 1.0, env_kwargs=kwargs)
+    first = collect_all([job], tmp_path, make_env=make_stub)[0].stat().st_mtime_ns
+    assert collect_all([job], tmp_path, make_env=make_stub)[0].stat().st_mtime_ns == first
+    other = dataclasses.replace(job, env_kwargs={"randomization": True})
+    with pytest.raises(ShardMismatchError):
+        collect_all([other], tmp_path, make_env=make_stub)
 
 
 def test_end_before_a_fall_is_dropped():
@@ -96,7 +128,17 @@ def test_worker_processes_make_the_same_shards(tmp_path):
         np.testing.assert_array_equal(Demonstrations.load(one).obs, Demonstrations.load(other).obs)
 
 
-@pytest.mark.parametrize("kwargs", [{"noise_rad": -1}, {"kick_interval": 0}, {"command_interval": (3, 1)}])
+@pytest.mark.parametrize(
+    "kwargs",
+    [
+        {"noise_rad": -1},
+        {"kick_interval": 0},
+        {"command_interval": (3, 1)},
+        {"task_interval": (0, 1)},
+        {"task_interval": 2.0},
+        {"corner_share": 1.1},
+    ],
+)
 def test_bad_perturbation(kwargs):
     with pytest.raises(InvalidInputError):
         PerturbationConfig(**kwargs)

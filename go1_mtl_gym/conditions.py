@@ -1,0 +1,57 @@
+"""What an environment's episodes take place under: physics, sensor noise and estimator noise."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from go1_mtl_gym.episode import Episode
+from go1_mtl_gym.estimator import EstimatorError, EstimatorNoise
+from go1_mtl_gym.observation import SensorNoise
+from go1_mtl_gym.randomization import DomainRandomization
+from go1_mtl_gym.realism import Realism
+from go1_mtl_gym.simulation import Simulation
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """The environment's own conditions, and how an episode's are drawn.
+
+    Attributes:
+        realism: what is different about the physics.
+        sensor_noise: of the sensors, or None.
+        estimator_noise: of the expert's state estimator, or None.
+        randomization: of physics and sensor noise, or None.
+
+    Raises:
+        InvalidInputError: if the randomization can draw impossible sensor noise.
+    """
+
+    realism: Realism
+    sensor_noise: SensorNoise | None
+    estimator_noise: EstimatorNoise | None
+    randomization: DomainRandomization | None
+
+    def __post_init__(self) -> None:
+        if self.randomization is not None and self.randomization.noise is not None:
+            self._scaled_noise(self.randomization.noise[1])
+
+    def begin(self, episode: Episode, simulation: Simulation, rng: np.random.Generator) -> None:
+        """Give an episode its noise, and the simulation its physics.
+
+        Args:
+            episode: gets `sensor_noise` and `estimator_error`.
+            simulation: gets its realism if there is a randomization, and is left alone otherwise.
+            rng: gives one number for the estimator noise and one for the randomization, whatever is drawn from them.
+        """
+        episode.sensor_noise = self.sensor_noise
+        if self.estimator_noise is not None:
+            episode.estimator_error = EstimatorError(self.estimator_noise, int(rng.integers(2**63)))
+        if self.randomization is not None:
+            own = np.random.default_rng(int(rng.integers(2**63)))
+            realism, factor = self.randomization.draw(own, self.realism)
+            simulation.set_realism(realism)
+            if factor is not None:
+                episode.sensor_noise = self._scaled_noise(factor)
+
+    def _scaled_noise(self, factor: float) -> SensorNoise:
+        return (self.sensor_noise or SensorNoise()).scaled(factor)

@@ -1,0 +1,230 @@
+"""Randomised episodes: figures within their ranges, reproducible, copied to the bit, and no trace of them otherwise."""
+
+import copy
+import dataclasses
+import json
+import pickle
+
+import gymnasium
+import numpy as np
+import pytest
+
+from go1_mtl_gym import DomainRandomization, SensorNoise, robot
+from go1_mtl_gym.env import Go1Env
+from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.randomization import Range
+from go1_mtl_gym.realism import Realism
+
+RANGES = [each.name for each in dataclasses.fields(DomainRandomization) if each.type == Range]
+NOTHING = DomainRandomization(**dict.fromkeys(RANGES))
+
+
+def draws(randomization: DomainRandomization, number: int, base: Realism | None = None) -> list:
+    rng = np.random.default_rng(0)
+    return [randomization.draw(rng, base or Realism()) for _ in range(number)]
+
+
+# -- Draws -------------------------------------------------------------------------------------------------------------
+
+
+def test_draws_fill_their_ranges_evenly_and_independently():
+    default = DomainRandomization()
+    assert len(RANGES) == len(dataclasses.fields(Realism)) + 1
+    rows = np.array([[*dataclasses.astuple(realism), factor] for realism, factor in draws(default, 2000)])
+    low, high = np.array([getattr(default, name) for name in RANGES]).T
+    level = (rows - low) / (high - low)
+    assert (level >= 0).all() and (level <= 1).all()
+    np.testing.assert_allclose(level.mean(axis=0), 0.5, atol=4 * np.sqrt(1 / 12 / 2000))
+    assert level.min(axis=0).max() < 0.01 and level.max(axis=0).min() > 0.99
+    assert np.abs(np.corrcoef(level.T) - np.eye(len(RANGES))).max() < 0.1
+
+
+def test_a_range_of_none_leaves_the_base_and_the_other_draws():
+    base = Realism(friction=0.3, payload_kg=1.0)
+    all_drawn, some = draws(DomainRandomization(), 20), draws(DomainRandomization(friction=None, noise=None), 20, base)
+    for (realism, _), (other, factor) in zip(all_drawn, some):
+        assert other == dataclasses.replace(realism, friction=0.3) and factor is None
+    assert draws(NOTHING, 5, base) == [(base, None)] * 5
+
+
+def test_a_share_of_the_episodes_is_randomised():
+    base = Realism(contact_time_s=0.03)
+    mixed, every = draws(DomainRandomization(share=0.3), 2000, base), draws(DomainRandomization(), 2000, base)
+    drawn = [one for one in mixed if one != (base, None)]
+    assert len(drawn) / 2000 == pytest.approx(0.3, abs=4 * np.sqrt(0.3 * 0.7 / 2000))
+    assert all(one in ((base, None), other) for one, other in zip(mixed, every)), "the others are as without a share"
+    assert draws(DomainRandomization(share=0.0), 50, base) == [(base, None)] * 50
+
+
+def test_a_range_of_one_point_gives_it():
+    ranges = {"friction": (0.7, 0.7), "motor_strength": (1.5, 1.5), "noise": (0.0, 0.0)}
+    for realism, factor in draws(dataclasses.replace(NOTHING, **ranges), 20):
+        assert realism == Realism(friction=0.7, motor_strength=1.5) and factor == 0.0
+
+
+def test_it_survives_json():
+    own = DomainRandomization(friction=[0.5, 1], payload_kg=None, share=0.5)
+    again = DomainRandomization(**json.loads(json.dumps(dataclasses.asdict(own))))
+    assert again == own and hash(again) == hash(own) and own.friction == (0.5, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"friction": (1.0, 0.4)}, r"range of friction must be low <= high, got \(1.0, 0.4\)"),
+        ({"friction": (0.0, 1.0)}, r"friction must lie in \[0.05, 2\], got 0"),
+        ({"payload_kg": (0.0, 11.0)}, r"payload_kg \[kg\] must lie in \[0, 10\], got 11"),
+        ({"motor_strength": (0.9, 1.6)}, "motor_strength.*1.6"),
+        ({"joint_friction": 0.5}, r"range of joint_friction must have shape \(2,\)"),
+        ({"rotor_inertia": (0.0, float("nan"))}, "range of rotor_inertia must be finite"),
+        ({"contact_time_s": ("soft", "stiff")}, "range of contact_time_s must be 2 numbers.*soft"),
+        ({"noise": (-1.0, 1.0)}, "factor on the sensor noise.*got -1"),
+        ({"share": 1.5}, r"share of randomised episodes must lie in \[0, 1\], got 1.5"),
+    ],
+)
+def test_impossible_ranges_are_refused(arguments, words):
+    with pytest.raises(InvalidInputError, match=words):
+        DomainRandomization(**arguments)
+
+
+# -- In the environment ------------------------------------------------------------------------------------------------
+
+
+def test_every_reset_draws_and_a_seed_repeats_it():
+    env, twin = Go1Env("trot", randomization=True), Go1Env("trot", randomization=True)
+    assert env.realism == Realism()
+    seen = []
+    for seed in (0, None, None, 1, None):
+        one, other = env.reset(seed=seed)[0], twin.reset(seed=seed)[0]
+        np.testing.assert_array_equal(one, other)
+        for action in np.random.default_rng(0).uniform(-0.2, 0.2, (5, 12)):
+            np.testing.assert_array_equal(env.step(action)[0], twin.step(action)[0])
+        assert env.realism == twin.realism and env.realism not in seen
+        seen.append(env.realism)
+    env.reset(seed=0)
+    assert env.realism == seen[0]
+
+
+def test_the_model_is_the_drawn_one():
+    env = Go1Env("trot", randomization=True, kp=40.0)
+    for seed in range(3):
+        env.reset(seed=seed)
+        model, realism = env.simulation.model, env.realism
+        assert model.body_mass.sum() == pytest.approx(robot.MASS + realism.payload_kg)
+        assert (model.geom_friction[:, 0] == realism.friction).all()
+        np.testing.assert_allclose(model.actuator_gainprm[:, 0], 40.0 * realism.motor_strength)
+        assert (model.dof_armature[6:] == realism.rotor_inertia).all()
+        assert (model.dof_frictionloss[6:] == realism.joint_friction).all()
+        assert model.geom_solref[model.geom("FL_foot").id, 0] == realism.contact_time_s
+        assert len(env.simulation.snapshot()) == len(Go1Env("trot").simulation.snapshot()) + 12 * realism.delay_steps
+        assert env.simulation.feet_w[:, 2].min() == pytest.approx(robot.FOOT_RADIUS)
+
+
+@pytest.mark.parametrize("kwargs", [{}, {"estimator_noise": True}])
+def test_command_and_pose_after_a_reset_are_those_without_randomization(kwargs):
+    env, plain = Go1Env(None, randomization=True, **kwargs), Go1Env(None, **kwargs)
+    for seed in range(4):
+        (_, info), (_, expected) = env.reset(seed=seed), plain.reset(seed=seed)
+        assert info.keys() == expected.keys() and info["task"] == expected["task"]
+        np.testing.assert_array_equal(info["command"], expected["command"])
+        np.testing.assert_array_equal(env.state.q, plain.state.q)
+        np.testing.assert_array_equal(env.estimated_state.q, plain.estimated_state.q)
+
+
+def test_a_share_of_none_is_the_environment_itself():
+    own = {"friction": 0.6, "payload_kg": 1.0}
+    env, plain = Go1Env("walk", randomization=DomainRandomization(share=0.0), **own), Go1Env("walk", **own)
+    np.testing.assert_array_equal(env.reset(seed=2)[0], plain.reset(seed=2)[0])
+    for action in np.random.default_rng(0).uniform(-0.2, 0.2, (10, 12)):
+        np.testing.assert_array_equal(env.step(action)[0], plain.step(action)[0])
+    assert env.realism == plain.realism == Realism(**own)
+
+
+def test_without_randomization_a_reset_leaves_the_model_alone():
+    env = Go1Env("trot", friction=0.6)
+    env.simulation.model.geom_friction[:, 0] = 0.3  # an experiment of the user's
+    env.reset(seed=0)
+    assert (env.simulation.model.geom_friction[:, 0] == 0.3).all()
+
+
+@pytest.mark.parametrize(
+    ("noise", "deviation"), [(None, 0.005), (True, 0.005), (SensorNoise(q=0.02), 0.02), (False, 0.005)]
+)
+def test_the_factor_multiplies_the_environments_noise_or_the_default(noise, deviation):
+    randomization = dataclasses.replace(NOTHING, noise=(1.5, 1.5))
+    env = Go1Env("trot", noise=noise, randomization=randomization, history=50)
+    obs, _ = env.reset(seed=0)
+    errors = [obs[env.layout.slices["q"]] - env.state.q]
+    for _ in range(100):
+        obs = env.step(env.action_map.from_radians(robot.HOME_POSE))[0]
+        errors.append(obs[env.layout.slices["q"]] - env.state.q)
+    assert np.std(errors) == pytest.approx(1.5 * deviation, rel=0.08)
+    assert np.abs(errors[0]).max() > 0, "the first observation has the noise too"
+
+
+def test_the_noise_of_an_episode_is_forgotten_by_the_next():
+    env = Go1Env("trot", randomization=dataclasses.replace(NOTHING, noise=(1.0, 1.0), share=0.5))
+    exact = []
+    for seed in range(12):
+        obs, _ = env.reset(seed=seed)
+        exact.append(np.array_equal(obs[env.layout.slices["q"]], env.state.q.astype(np.float32)))
+    assert {True, False} == set(exact)
+
+
+def test_noise_that_could_become_impossible_is_refused_at_once():
+    with pytest.raises(InvalidInputError, match="sensor noise of gyroscope.*got 12"):
+        Go1Env("trot", noise=SensorNoise(gyroscope=8.0), randomization=True)
+
+
+@pytest.mark.parametrize("randomization", [0.5, {"friction": (0.4, 1.0)}])
+def test_another_kind_of_randomization_is_refused(randomization):
+    with pytest.raises(InvalidInputError, match="randomization must be None, True, False or a DomainRandomization"):
+        Go1Env("trot", randomization=randomization)
+
+
+# -- Copies ------------------------------------------------------------------------------------------------------------
+
+RANDOMISED = {"randomization": DomainRandomization(friction=(0.3, 0.9), share=0.8), "payload_kg": 0.5, "noise": True}
+
+
+@pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_copy_of_a_randomised_episode_continues_to_the_bit(duplicate, seed):
+    env = Go1Env(None, history=2, motor_strength=1.05, **RANDOMISED)
+    env.reset(seed=seed)
+    actions = np.random.default_rng(seed).uniform(-0.2, 0.2, (30, 12))
+    for action in actions[:10]:
+        env.step(action)
+    twin = duplicate(env)
+    assert twin.realism == env.realism
+    for action in actions[10:]:
+        np.testing.assert_array_equal(env.step(action)[0], twin.step(action)[0])
+    np.testing.assert_array_equal(env.simulation.snapshot(), twin.simulation.snapshot())
+    np.testing.assert_array_equal(env.reset()[0], twin.reset()[0])
+    assert twin.realism == env.realism
+
+
+def test_it_goes_through_gymnasium_make_and_its_spec():
+    env = gymnasium.make("go1_mtl_gym:Go1Trot-v0", disable_env_checker=True, rotor_inertia=0.01, **RANDOMISED)
+    again = gymnasium.make(pickle.loads(pickle.dumps(env.spec)))
+    np.testing.assert_array_equal(env.reset(seed=5)[0], again.reset(seed=5)[0])
+    assert env.unwrapped.realism == again.unwrapped.realism != Realism()
+
+
+def test_the_expert_is_told_nothing():
+    asked = []
+
+    class Deaf:
+        def __init__(self, gains, hold_s):
+            asked.append((gains.kp, gains.kd))
+
+        def reset(self, state):
+            pass
+
+        def action(self, state):
+            return robot.HOME_POSE
+
+    env = Go1Env("trot", expert=Deaf, randomization=dataclasses.replace(NOTHING, motor_strength=(0.8, 0.8)))
+    env.reset(seed=0)
+    np.testing.assert_allclose(env.action_map.to_radians(env.expert_action()), robot.HOME_POSE, atol=1e-6)
+    assert asked == [(50.0, 2.0)] and env.simulation.model.actuator_gainprm[0, 0] == 40.0
