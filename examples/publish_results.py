@@ -28,6 +28,8 @@ from trainers.report import benchmark_table, markdown, paper_table, results_tabl
 ROOT = Path(__file__).resolve().parents[1]
 COPIED = ("joint_targets.png", "gaits.gif")
 """Files of a run that are published as they are, next to ``metrics.json``."""
+FOLDERS = ("--out", "--out-dir", "--parts")
+"""Options of a command that say where its files go."""
 SETTINGS = {
     "control_hz": "control rate [Hz]",
     "channels": "channels",
@@ -90,12 +92,12 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def without_out(command: str) -> str:
-    """A command line without ``--out`` and ``--parts``, folders that only its machine knows, and their values."""
+    """A command line without the options that name folders of its machine (`FOLDERS`), and without their values."""
     words, kept = iter(shlex.split(command)), []
     for word in words:
-        if word in ("--out", "--parts"):
+        if word in FOLDERS:
             next(words, None)
-        elif not word.startswith(("--out=", "--parts=")):
+        elif word.partition("=")[0] not in FOLDERS:
             kept.append(word)
     return shlex.join(kept)
 
