@@ -2,18 +2,22 @@
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
 import trainers
 from go1_mtl_gym import TASKS
 from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.realism import Realism
 from trainers.metrics import wilson_interval
 
 EXPERT = "expert"
 SHARED = ("tasks", "control_hz", "kp", "kd")
 """Arguments of the students' environments that the expert's has as well; the others shape what only students see."""
+
+WORLD = ("randomization", "noise", "estimator_noise", *(each.name for each in fields(Realism)))
+"""Arguments in which the environment that a student was trained in may differ; here all walk in the model's world."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +28,7 @@ class Walker:
         name: what it is called in tables and figures.
         path: the student's file; None is the expert.
         sha256: of the file.
-        env_kwargs: of the environment, on top of what a student brings along.
+        env_kwargs: of the expert's environment; a student brings its own.
     """
 
     name: str
@@ -33,8 +37,12 @@ class Walker:
     env_kwargs: dict[str, Any] = field(default_factory=dict)
 
     def load(self) -> Any:
-        """What `trainers.evaluate` takes: the policy or "expert"."""
-        return EXPERT if self.path is None else trainers.load(self.path)
+        """What `trainers.evaluate` takes: the policy, for an environment without its `WORLD`, or "expert"."""
+        if self.path is None:
+            return EXPERT
+        policy = trainers.load(self.path)
+        policy.env_kwargs = {name: value for name, value in policy.env_kwargs.items() if name not in WORLD}
+        return policy
 
 
 def walkers(policies: Sequence[str]) -> list[Walker]:

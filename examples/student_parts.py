@@ -14,8 +14,12 @@ from student_switching import SwitchingConfig, switching
 
 import experts
 import go1_mtl_gym
-from trainers import evaluation
+import trainers
 from trainers.checkpoint import versions
+from trainers.evaluation import controller
+
+SCORING = (trainers.evaluate, trainers.ClosedLoopResult, controller)
+"""What stands in the files of `trainers` that a figure depends on."""
 
 
 @dataclass(frozen=True)
@@ -76,8 +80,7 @@ class StudentPart:
         words = (
             own.sha256 or sources(experts) + repr(sorted(own.env_kwargs.items())),
             repr((self.section.config, self.seed, versions())),
-            inspect.getsource(inspect.getmodule(self.section.measure)),
-            inspect.getsource(evaluation),
+            *(inspect.getsource(inspect.getmodule(each)) for each in (self.section.measure, *SCORING)),
             sources(go1_mtl_gym),
         )
         who = own.sha256[:8] or own.name

@@ -10,7 +10,7 @@ from expert_limits import CRUISE, DIRECTIONS, kick_w
 
 from go1_mtl_gym import TASKS
 from trainers.environments import derive_seed, make_env
-from trainers.evaluation import begin, controller
+from trainers.evaluation import controller
 
 PAIRS = {"lateral": ("left", "right"), "fore-aft": ("forward", "backward")}
 """Directions of which the weaker one counts."""
@@ -73,7 +73,7 @@ def _kick(
     keys = ("kick", task, direction, seed, trial)
     base, act = env.unwrapped, controller(who, env.unwrapped)
     before_s = config.before_s + generator(*keys).uniform() * TASKS[task].gait.period
-    obs, _ = begin(env, who, derive_seed(*keys), {"task": task, "command": CRUISE})
+    obs, _ = env.reset(seed=derive_seed(*keys), options={"task": task, "command": CRUISE})
     obs, fallen = _walk(env, act, obs, before_s)
     if fallen:
         return False
