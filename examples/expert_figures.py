@@ -10,6 +10,7 @@ from expert_limits import DIRECTIONS
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 
 from go1_mtl_gym import TASKS, robot
 
@@ -24,39 +25,50 @@ def save_figures(expert: Mapping[str, Any], folder: Path) -> list[Path]:
     for name, (section, draw) in FIGURES.items():
         data = expert["report"].get(section)
         if data and any(data.values()):
-            path = folder / f"expert_{name}.png"
-            folder.mkdir(parents=True, exist_ok=True)
-            draw(data).savefig(path, dpi=DPI, metadata={"Software": None})
-            written.append(path)
+            written.append(save_figure(draw(data), folder / f"expert_{name}.png"))
     return written
+
+
+def save_figure(figure: Figure, path: Path) -> Path:
+    """Write a figure, equal ones to equal bytes; returns the file."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=DPI, metadata={"Software": None})
+    return path
 
 
 def transition_figure(data: Mapping[str, Mapping[str, Any]]) -> Figure:
     """Survival of every change of gait, from the row's to the column's."""
+    figure = new_figure(1.6 + 0.75 * len(data), 1.3 + 0.62 * len(data))
+    ax = figure.subplots()
+    image = pair_matrix(ax, data, "survived")
+    ax.set_title("Survived changes of gait")
+    figure.colorbar(image, ax=ax, shrink=0.85, label="share")
+    return figure
+
+
+def pair_matrix(ax: Axes, data: Mapping[str, Mapping[str, Any]], counted: str) -> AxesImage:
+    """Draw {from: {to: {counted: ..., "trials": ...}}}, one square per change of gait; returns the image."""
     gaits = list(data)
     share = np.full((len(gaits), len(gaits)), np.nan)
-    figure = _figure(1.6 + 0.75 * len(gaits), 1.3 + 0.62 * len(gaits))
-    ax = figure.subplots()
     for i, source in enumerate(gaits):
         for j, target in enumerate(gaits):
             pair = data[source].get(target)
             if pair and pair["trials"]:
-                share[i, j] = pair["survived"] / pair["trials"]
-                text, colour = f"{pair['survived']}/{pair['trials']}", "white" if share[i, j] > 0.6 else "black"
+                share[i, j] = pair[counted] / pair["trials"]
+                text, colour = f"{pair[counted]}/{pair['trials']}", "white" if share[i, j] > 0.6 else "black"
                 ax.text(j, i, text, ha="center", va="center", fontsize=9, color=colour)
     image = ax.imshow(np.ma.masked_invalid(share), cmap="Blues", vmin=0.0, vmax=1.0)
     ax.set_facecolor("0.93")
     ax.set_xticks(range(len(gaits)), gaits)
     ax.set_yticks(range(len(gaits)), gaits)
-    ax.set(xlabel="to", ylabel="from", title="Survived changes of gait")
+    ax.set(xlabel="to", ylabel="from")
     ax.tick_params(length=0)
-    figure.colorbar(image, ax=ax, shrink=0.85, label="share")
-    return figure
+    return image
 
 
 def push_figure(data: Mapping[str, Mapping[str, float]]) -> Figure:
     """Largest kick survived at every phase of the cycle, per direction, with the prototype's lines."""
-    figure = _figure(2.1 * len(data) + 1.2, 3.1)
+    figure = new_figure(2.1 * len(data) + 1.2, 3.1)
     axes = figure.subplots(1, len(data), sharey=True, squeeze=False)[0]
     for ax, (gait, kicks) in zip(axes, data.items()):
         names = [name for name in DIRECTIONS if name in kicks]
@@ -72,7 +84,7 @@ def push_figure(data: Mapping[str, Mapping[str, float]]) -> Figure:
         ax.set_title(gait, fontsize=10)
     axes[0].set_ylabel("largest kick survived [m/s]")
     axes[0].margins(y=0.15)
-    _legend(figure, axes)
+    legend(figure, axes)
     return figure
 
 
@@ -80,7 +92,7 @@ def limit_figure(data: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> Figure:
     """Largest command along each axis that is survived, and that is tracked, with the prototype's lines."""
     titles = {"vx": "forward [m/s]", "-vx": "backward [m/s]", "vy": "sideways [m/s]", "yaw": "yaw rate [rad/s]"}
     shown = [axis for axis in titles if any(axis in own for own in data.values())]
-    figure = _figure(3.0 * len(shown) + 0.6, 0.36 * len(data) + 1.5)
+    figure = new_figure(3.0 * len(shown) + 0.6, 0.36 * len(data) + 1.5)
     axes = figure.subplots(1, len(shown), sharey=True, squeeze=False)[0]
     for ax, axis in zip(axes, shown):
         for row, (gait, own) in enumerate(data.items()):
@@ -97,7 +109,7 @@ def limit_figure(data: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> Figure:
         ax.set_yticks(range(len(data)), list(data))
         ax.set_xlim(left=0)
     axes[0].invert_yaxis()
-    _legend(figure, axes)
+    legend(figure, axes)
     return figure
 
 
@@ -106,7 +118,7 @@ def contact_figure(data: Mapping[str, Mapping[str, Any]]) -> Figure:
     known = {gait: own["cruise"]["schedule"] for gait, own in data.items() if "schedule" in own["cruise"]}
     columns = 2 if len(known) > 1 else 1
     rows = -(-len(known) // columns)
-    figure = _figure(4.4 * columns + 0.3, 1.55 * rows + 0.6)
+    figure = new_figure(4.4 * columns + 0.3, 1.55 * rows + 0.6)
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
     for ax, (gait, legs) in zip(axes, known.items()):
         _contacts(ax, gait, legs)
@@ -114,7 +126,7 @@ def contact_figure(data: Mapping[str, Mapping[str, Any]]) -> Figure:
         ax.set_axis_off()
     for ax in axes[max(0, len(known) - columns) : len(known)]:
         ax.set_xlabel("gait clock [cycles]", fontsize=9)
-    _legend(figure, axes[:1])
+    legend(figure, axes[:1])
     return figure
 
 
@@ -136,13 +148,14 @@ def _contacts(ax: Axes, gait: str, legs: list[list[list[float]]]) -> None:
     ax.tick_params(axis="x", labelsize=8)
 
 
-def _figure(width: float, height: float) -> Figure:
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure of some size [inch] on an Agg canvas."""
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
 
-def _legend(figure: Figure, axes: Any) -> None:
+def legend(figure: Figure, axes: Any) -> None:
     """One legend for all panels, above them."""
     found: dict[str, Any] = {}
     for ax in axes:

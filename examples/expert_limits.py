@@ -172,7 +172,11 @@ def _kick(lab: Lab, task: str, direction: str, size: float, k: int, config: Push
             break
         if lab.step()["fallen"]:
             return False
-    yaw, (x, y) = lab.env.state.rpy[2], DIRECTIONS[direction]
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    lab.env.push((size * (cos * x - sin * y), size * (sin * x + cos * y), 0.0))
+    lab.env.push(kick_w(direction, size, lab.env.state.rpy[2]))
     return lab.walk(config.after_s)
+
+
+def kick_w(direction: str, size: float, yaw: float) -> tuple[float, float, float]:
+    """A kick of some size [m/s] in one of the `DIRECTIONS` of a heading [rad]: change of velocity, world frame."""
+    (x, y), cos, sin = DIRECTIONS[direction], np.cos(yaw), np.sin(yaw)
+    return size * (cos * x - sin * y), size * (sin * x + cos * y), 0.0

@@ -19,6 +19,7 @@ from typing import Any
 
 from dagger_config import PRESETS, JobConfig
 from expert_page import PICTURES, expert_block, expert_section
+from student_page import CHAPTERS, student_section
 
 from go1_mtl_gym import TASKS, env_id
 from go1_mtl_gym.errors import InvalidInputError
@@ -28,6 +29,8 @@ from trainers.report import benchmark_table, markdown, paper_table, results_tabl
 ROOT = Path(__file__).resolve().parents[1]
 COPIED = ("joint_targets.png", "gaits.gif")
 """Files of a run that are published as they are, next to ``metrics.json``."""
+FOLDERS = ("--out", "--out-dir", "--parts")
+"""Options of a command that say where its files go."""
 SETTINGS = {
     "control_hz": "control rate [Hz]",
     "channels": "channels",
@@ -90,12 +93,12 @@ def read_json(path: Path) -> dict[str, Any]:
 
 
 def without_out(command: str) -> str:
-    """A command line without ``--out`` and ``--parts``, folders that only its machine knows, and their values."""
+    """A command line without the options that name folders of its machine (`FOLDERS`), and without their values."""
     words, kept = iter(shlex.split(command)), []
     for word in words:
-        if word in ("--out", "--parts"):
+        if word in FOLDERS:
             next(words, None)
-        elif not word.startswith(("--out=", "--parts=")):
+        elif word.partition("=")[0] not in FOLDERS:
             kept.append(word)
     return shlex.join(kept)
 
@@ -138,6 +141,7 @@ def results_page(
     expert: Mapping[str, Any] | None,
     pictures: Sequence[str] = (),
     benchmark: Mapping[str, Any] | None = None,
+    student: Sequence[str] = (),
 ) -> str:
     """``docs/results/README.md``.
 
@@ -146,6 +150,7 @@ def results_page(
         expert: its report, if there is one.
         pictures: names of the expert's pictures that are there.
         benchmark: of the expert against others, if there is one.
+        student: paragraphs of the student's report, if there is one.
     """
     parts = [
         "# Results",
@@ -161,6 +166,7 @@ def results_page(
         "so the table says how well each network fits its own expert, not which one is better.",
         "## Wall time",
         seconds_table(metrics["seconds"]),
+        *student,
     ]
     if expert is not None:
         parts += expert_section(expert, _made_by(expert), pictures)
@@ -169,6 +175,17 @@ def results_page(
     versions = [[name, str(value)] for name, value in metrics["versions"].items()]
     parts += ["## Versions", markdown(["package", "version"], versions, text_columns=2)]
     return "\n\n".join(parts) + "\n"
+
+
+def student_report(results: Path) -> list[str]:
+    """Paragraphs of those sections of the student's report that `results` holds."""
+    parts = []
+    for name in CHAPTERS:
+        path = results / f"student_{name}.json"
+        if path.is_file():
+            data = read_json(path)
+            parts += student_section(name, data, _made_by(data), path.with_suffix(".png").is_file())
+    return ["## Student, beside the expert", *parts] if parts else []
 
 
 def rewrite(text: str, blocks: Mapping[str, str]) -> str:
@@ -208,7 +225,7 @@ def pages(root: Path) -> dict[Path, str]:
         files = [results / f"{name}.json" for name in ("metrics", "expert", "benchmark_expert")]
         metrics, expert, benchmark = (read_json(path) if path.is_file() else None for path in files)
         pictures = [name for name in PICTURES if (results / f"expert_{name}.png").is_file()]
-        texts[results / "README.md"] = results_page(metrics, expert, pictures, benchmark)
+        texts[results / "README.md"] = results_page(metrics, expert, pictures, benchmark, student_report(results))
     return texts
 
 

@@ -19,8 +19,9 @@ from typing import Any
 from expert_bars import compare
 from expert_figures import save_figures
 from expert_page import card_table, totals_text
-from expert_parts import QUICK, SECTIONS, Part, Section, measure_all
+from expert_parts import QUICK, SECTIONS, Part, Section
 from publish_results import without_out
+from report_parts import measure_all
 
 from go1_mtl_gym import TASKS, Go1Error
 from go1_mtl_gym.errors import InvalidInputError

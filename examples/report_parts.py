@@ -1,0 +1,76 @@
+"""Finished parts of a report on disk, so that Ctrl-C costs little: named by what made them, measured side by side."""
+
+import hashlib
+import json
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from operator import methodcaller
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Protocol
+
+import joblib
+from threadpoolctl import threadpool_limits
+from tqdm.auto import tqdm
+
+from trainers.files import json_ready, write_json
+
+
+class Part(Protocol):
+    """One part of a report; picklable."""
+
+    section: Any
+    """With `alone`: whether nothing else may run meanwhile, because it measures time."""
+
+    def measure(self) -> dict[str, Any]:
+        """The finished part, as `finished` gives it."""
+
+
+def digest(words: Iterable[str]) -> str:
+    """12 hexadecimal digits that change with any of the words."""
+    total = hashlib.sha256()
+    for word in words:
+        total.update(word.encode())
+    return total.hexdigest()[:12]
+
+
+def sources(*packages: ModuleType) -> str:
+    """The code and the robot descriptions of some packages, as one text."""
+    folders = [Path(package.__file__).parent for package in packages]
+    files = sorted(path for folder in folders for kind in ("*.py", "*.xml") for path in folder.rglob(kind))
+    return "\n".join(path.read_text(encoding="utf-8") for path in files)
+
+
+def finished(path: Path, measure: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """A finished part: read from `path` if it is there, else measured on one thread, timed and written there."""
+    if path.is_file():
+        return json.loads(path.read_text(encoding="utf-8"))
+    start = time.monotonic()
+    with threadpool_limits(1):
+        part = measure()
+    part["seconds"] = round(time.monotonic() - start, 2)
+    write_json(path, part)
+    return json_ready(part)
+
+
+def measure_all(parts: Sequence[Part], n_jobs: int) -> list[dict[str, Any]]:
+    """Measure what is not there yet, in processes side by side; what measures time comes last, alone."""
+    together = [part for part in parts if not part.section.alone]
+    ordered = [*together, *(part for part in parts if part.section.alone)]
+    with tqdm(total=len(ordered), desc="report", unit="part") as bar:
+        return [_shown(bar, part) for part in _results(together, ordered[len(together) :], n_jobs)]
+
+
+def _results(together: list[Part], alone: list[Part], n_jobs: int) -> Iterator[dict[str, Any]]:
+    if n_jobs == 1:
+        yield from (part.measure() for part in together)
+    else:
+        parallel = joblib.Parallel(n_jobs=n_jobs, return_as="generator")
+        yield from parallel(joblib.delayed(methodcaller("measure"))(part) for part in together)
+    yield from (part.measure() for part in alone)
+
+
+def _shown(bar: tqdm, part: dict[str, Any]) -> dict[str, Any]:
+    bar.set_postfix_str(" ".join(part[name] for name in ("section", "task", "what") if name in part))
+    bar.update()
+    return part

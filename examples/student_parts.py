@@ -1,0 +1,108 @@
+"""The sections of the student's report, and their parts: one walker, one gait, and one thing that is done to it."""
+
+import inspect
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from report_parts import digest, finished, sources
+from student_lab import Walker
+from student_pushes import KickConfig, pushes
+from student_robustness import RobustnessConfig, robustness
+from student_switching import SwitchingConfig, switching
+
+import experts
+import go1_mtl_gym
+import trainers
+from trainers.checkpoint import versions
+from trainers.evaluation import controller
+
+SCORING = (trainers.evaluate, trainers.ClosedLoopResult, controller)
+"""What stands in the files of `trainers` that a figure depends on."""
+
+
+@dataclass(frozen=True)
+class Section:
+    """One thing that is measured per walker and gait.
+
+    Attributes:
+        measure: (policy or "expert", task, part, config, seed, **env_kwargs) -> figures.
+        config: its settings; ``config.parts(task, tasks)`` names the parts of a gait among the students' gaits.
+        quick: settings of ``--quick``: everything is measured, nothing is measured well.
+        alone: whether nothing else may run meanwhile, because it measures time.
+    """
+
+    measure: Callable[..., dict[str, Any]]
+    config: Any
+    quick: Any
+    alone: bool = False
+
+
+SECTIONS = {
+    "switching": Section(switching, SwitchingConfig(), SwitchingConfig(trials=1, before_s=0.5, after_s=3.0)),
+    "robustness": Section(robustness, RobustnessConfig(), RobustnessConfig(1, 3.0, 1.5, every=2)),
+    "pushes": Section(pushes, KickConfig(), KickConfig(2, grid=2, before_s=0.5, after_s=0.5)),
+}
+"""Every section by name."""
+
+
+@dataclass(frozen=True)
+class StudentPart:
+    """One part of one section.
+
+    Attributes:
+        name: of the section.
+        section: how it is measured.
+        walker: who is measured.
+        task: the gait.
+        what: which of the section's parts.
+        seed: of everything random.
+        folder: where finished parts are kept.
+    """
+
+    name: str
+    section: Section
+    walker: Walker
+    task: str
+    what: str
+    seed: int
+    folder: Path
+
+    @property
+    def path(self) -> Path:
+        """File of the finished part; its name changes with anything that could change the figures.
+
+        That is the policy's file, whatever its name, or else the expert's code and environment; the settings, the
+        environment's code, that of the measurement, and versions.
+        """
+        own = self.walker
+        words = (
+            own.sha256 or sources(experts) + repr(sorted(own.env_kwargs.items())),
+            repr((self.section.config, self.seed, versions())),
+            *(inspect.getsource(inspect.getmodule(each)) for each in (self.section.measure, *SCORING)),
+            sources(go1_mtl_gym),
+        )
+        who = own.sha256[:8] or own.name
+        return self.folder / f"{self.name}-{who}-{self.task}-{self.what}-{digest(words)}.json"
+
+    def measure(self) -> dict[str, Any]:
+        """The finished part: read if it is there, else measured and written."""
+        return finished(self.path, self._figures)
+
+    def _figures(self) -> dict[str, Any]:
+        who, config = self.walker.load(), self.section.config
+        figures = self.section.measure(who, self.task, self.what, config, self.seed, **self.walker.env_kwargs)
+        return {"section": self.name, "task": self.task, "what": self.what, "figures": figures}
+
+
+def parts_of(
+    name: str, section: Section, who: Sequence[Walker], tasks: Sequence[str], seed: int, folder: Path
+) -> list[StudentPart]:
+    """All parts of a section."""
+    return [
+        StudentPart(name, section, walker, task, what, seed, folder)
+        for walker in who
+        for task in tasks
+        for what in section.config.parts(task, tasks)
+    ]
