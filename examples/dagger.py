@@ -33,6 +33,10 @@ from trainers.checkpoint import versions
 from trainers.files import json_ready, write_json
 
 BASELINES = ("pooled", "paper_literal")
+NOISE_RAD = 0.06
+"""Largest standard deviation of the noise on the expert's actions in disturbed demonstrations [rad]."""
+ROUND_NOISE_RAD = 0.02
+"""The same in DAgger rounds, where the learner disturbs enough [rad]."""
 PICTURE = {"width": 280, "height": 210, "fps": 25}
 
 
@@ -71,7 +75,7 @@ class Job:
     def demonstrations(self) -> tuple[trainers.Demonstrations, trainers.Demonstrations]:
         """Training rows (clean and perturbed) and held-out rows (clean, other commands and seeds)."""
         config = self.config
-        disturbed = trainers.PerturbationConfig()
+        disturbed = config.disturbed(NOISE_RAD)
         train = self._jobs(config.clean_s, None, 0) + self._jobs(config.perturbed_s, disturbed, 1)
         held_out = self._jobs(config.held_out_s, None, 2)
         with self.stage("demonstrations"):
@@ -87,8 +91,9 @@ class Job:
         config = self.config
         count = round(seconds / config.shard_s)
         first = (config.seed * 10 + block) * 10_000
+        env_kwargs = config.taught_env_kwargs if disturbed else config.env_kwargs
         return [
-            trainers.CollectJob(task, first + i, config.shard_s, None, disturbed, config.env_kwargs)
+            trainers.CollectJob(task, first + i, config.shard_s, None, disturbed, env_kwargs)
             for i in range(count)
             for task in config.tasks
         ]
@@ -114,9 +119,10 @@ class Job:
 
     def _dagger(self, policy: Any, train: trainers.Demonstrations, held_out: trainers.Demonstrations) -> Any:
         config = self.config
-        changing = trainers.PerturbationConfig(noise_rad=0.02)
+        disturbed = config.disturbed(ROUND_NOISE_RAD)
         per_task = max(1, config.n_envs // len(config.tasks))
-        venv = trainers.make_venv(config.tasks, per_task, config.env_kwargs, changing, subproc=config.n_envs > 1)
+        kwargs = config.taught_env_kwargs
+        venv = trainers.make_venv(config.tasks, per_task, kwargs, disturbed, subproc=config.n_envs > 1)
         try:
             trainer = trainers.DAggerTrainer(
                 venv,

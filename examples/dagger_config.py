@@ -5,9 +5,9 @@ import dataclasses
 import os
 from typing import Any
 
-from go1_mtl_gym import PAPER_TASKS, TASKS, InvalidInputError
+from go1_mtl_gym import PAPER_TASKS, TASKS, DomainRandomization, InvalidInputError
 from go1_mtl_gym.observation import CHANNELS
-from trainers import BCConfig, DAggerConfig
+from trainers import BCConfig, DAggerConfig, PerturbationConfig
 
 
 @dataclasses.dataclass(frozen=True)
@@ -24,9 +24,15 @@ class JobConfig:
         channels: optional parts of the observation.
         history: proprioceptive frames in the observation.
         control_hz: rate of the policy [Hz].
+        kp, kd: gains of the actuators [N m/rad, N m s/rad].
         clean_s, perturbed_s, held_out_s: demonstrations: undisturbed, disturbed, and undisturbed for the R2.
+        randomized: share of the disturbed episodes whose physics and sensor noise are drawn, by the ranges of
+            `go1_mtl_gym.DomainRandomization`.
+        task_interval: shortest and longest time between changes of gait in disturbed episodes, or None.
+        corner_share: probability with which a new command in them is a corner of its range.
         shard_s: length of a shard, which begins with a standing start.
         dagger_s: recorded in each DAgger round.
+        takeover_rad: of the DAgger rounds, see `trainers.DAggerConfig`.
         width: units of each hidden layer.
         normalization: of inputs and outputs, see `trainers.MultiHeadPolicy`.
         batch_size: rows per gradient step.
@@ -48,11 +54,17 @@ class JobConfig:
     channels: tuple[str, ...] = ("command", "phase", "last_action")
     history: int = 1
     control_hz: int = 50
+    kp: float = 50.0
+    kd: float = 2.0
     clean_s: float = 60.0
     perturbed_s: float = 240.0
     held_out_s: float = 60.0
+    randomized: float = 0.5
+    task_interval: tuple[float, float] | None = (2.0, 6.0)
+    corner_share: float = 0.25
     shard_s: float = 15.0
     dagger_s: float = 60.0
+    takeover_rad: float | None = None
     width: int = 256
     normalization: str = "mean_std"
     batch_size: int = 1024
@@ -80,9 +92,25 @@ class JobConfig:
             "channels": self.channels,
             "history": self.history,
             "control_hz": self.control_hz,
-            "kp": 50.0,
-            "kd": 2.0,
+            "kp": self.kp,
+            "kd": self.kd,
         }
+
+    @property
+    def taught_env_kwargs(self) -> dict[str, Any]:
+        """Of the environments that disturbed demonstrations and rounds are collected in."""
+        if not self.randomized:
+            return self.env_kwargs
+        return self.env_kwargs | {"randomization": DomainRandomization(share=self.randomized)}
+
+    def disturbed(self, noise_rad: float) -> PerturbationConfig:
+        """How a disturbed episode is disturbed, with action noise of at most `noise_rad`."""
+        several = len(self.tasks) > 1
+        return PerturbationConfig(
+            noise_rad=noise_rad,
+            corner_share=self.corner_share,
+            task_interval=self.task_interval if several else None,
+        )
 
     @property
     def literal_env_kwargs(self) -> dict[str, Any]:
@@ -103,7 +131,7 @@ class JobConfig:
     @property
     def dagger(self) -> DAggerConfig:
         """How to collect a DAgger round."""
-        return DAggerConfig(seconds_per_task=self.dagger_s, seed=self.seed)
+        return DAggerConfig(seconds_per_task=self.dagger_s, takeover_rad=self.takeover_rad, seed=self.seed)
 
 
 PRESETS: dict[str, dict[str, Any]] = {

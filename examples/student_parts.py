@@ -18,7 +18,7 @@ import trainers
 from trainers.checkpoint import versions
 from trainers.evaluation import controller
 
-SCORING = (trainers.evaluate, trainers.ClosedLoopResult, controller)
+SCORING = (trainers.evaluate, trainers.evaluate_switch, trainers.ClosedLoopResult, controller)
 """What stands in the files of `trainers` that a figure depends on."""
 
 

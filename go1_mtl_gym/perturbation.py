@@ -107,7 +107,7 @@ class PerturbationWrapper(gymnasium.Wrapper):
 
     def _draw_command(self, task: Task) -> np.ndarray:
         if self._corner_share > 0 and self._rng.uniform() < self._corner_share:
-            return self._rng.choice([-1.0, 1.0], 3) * np.array(task.command_range)
+            return task.draw_corner(self._rng)
         return task.draw_command(self._rng)
 
     def _draw_time(self, interval: tuple[float, float] | None) -> float:

@@ -84,9 +84,6 @@ class StubEnv(gymnasium.Env):
     def requested_task(self) -> Task:
         return self.task
 
-    def set_task(self, task: str) -> None:
-        self.task, self.phase = TASKS[task], 0.0
-
     def set_command(self, command) -> None:
         self.command = np.array(command, dtype=float)
 
