@@ -23,12 +23,12 @@ NO_GL = headless.choose_gl()
 
 import joblib
 from dagger_config import JobConfig, parse
+from dagger_pictures import draw
 from dagger_students import new_policy, train_baseline
 from tqdm.auto import tqdm
 
 import trainers
-from go1_mtl_gym import TASKS, Go1Error, InvalidInputError
-from go1_mtl_gym.rendering import RenderingError
+from go1_mtl_gym import Go1Error, InvalidInputError
 from trainers.checkpoint import versions
 from trainers.files import json_ready, write_json
 
@@ -37,7 +37,6 @@ NOISE_RAD = 0.06
 """Largest standard deviation of the noise on the expert's actions in disturbed demonstrations [rad]."""
 ROUND_NOISE_RAD = 0.02
 """The same in DAgger rounds, where the learner disturbs enough [rad]."""
-PICTURE = {"width": 280, "height": 210, "fps": 25}
 
 
 class Job:
@@ -64,10 +63,10 @@ class Job:
     def run(self) -> dict[str, Any]:
         """All stages, in order; returns what ``metrics.json`` holds."""
         train, held_out = self.demonstrations()
-        policies = {"multi_head": self.student(train, held_out)}
-        policies |= self.baselines()
+        student = self.student(train, held_out)
+        policies = {"multi_head": student} | self.clockless(student) | self.baselines()
         metrics = self.evaluate(policies, held_out)
-        self.pictures(policies["multi_head"], held_out)
+        draw(self.config, self.out, student, held_out, self.logger, NO_GL)
         return metrics
 
     # -- Demonstrations ------------------------------------------------------------------------------------------------
@@ -91,7 +90,7 @@ class Job:
         config = self.config
         count = round(seconds / config.shard_s)
         first = (config.seed * 10 + block) * 10_000
-        env_kwargs = config.taught_env_kwargs if disturbed else config.env_kwargs
+        env_kwargs = config.env_kwargs | (config.world if disturbed else {})
         return [
             trainers.CollectJob(task, first + i, config.shard_s, None, disturbed, env_kwargs)
             for i in range(count)
@@ -121,7 +120,7 @@ class Job:
         config = self.config
         disturbed = config.disturbed(ROUND_NOISE_RAD)
         per_task = max(1, config.n_envs // len(config.tasks))
-        kwargs = config.taught_env_kwargs
+        kwargs = config.env_kwargs | config.world
         venv = trainers.make_venv(config.tasks, per_task, kwargs, disturbed, subproc=config.n_envs > 1)
         try:
             trainer = trainers.DAggerTrainer(
@@ -160,6 +159,26 @@ class Job:
         }
         trainers.log_round(self.logger, round_num, closed_loop, trainers.offline_metrics(policy, held_out))
 
+    def clockless(self, student: Any) -> dict[str, Any]:
+        """The student with an estimate of the phase in its clock's place, where it has a clock."""
+        config, path = self.config, self.out / "clockless.zip"
+        if not (config.clockless_s and config.has_clock):
+            return {}
+        if not path.is_file():
+            with self.stage("clockless"):
+                policy = trainers.learn_without_clock(
+                    student,
+                    config.clockless_s,
+                    config.clockless_history,
+                    perturbation=config.disturbed(NOISE_RAD),
+                    config=trainers.PhaseConfig(steps=config.clockless_steps, seed=config.seed),
+                    seed=config.seed,
+                    progress=True,
+                    **config.world,
+                )
+            policy.save(path)
+        return {"clockless": trainers.load(path)}
+
     def baselines(self) -> dict[str, Any]:
         """The pooled and the paper-literal student, on the same rows with as many gradient steps, side by side."""
         names = [name for name in BASELINES if not (name == "paper_literal" and self._is_literal)]
@@ -187,6 +206,8 @@ class Job:
         config = self.config
         tasks: dict[str, dict[str, Any]] = {task: {} for task in config.tasks}
         for name, policy in policies.items():
+            if name == "clockless":  # these rows hold one frame, it needs several
+                continue
             rows = held_out.proprioceptive() if name == "paper_literal" else held_out
             for task, scores in trainers.offline_metrics(policy, rows).items():
                 tasks[task][name] = scores
@@ -217,6 +238,7 @@ class Job:
                 episodes=episodes,
                 seconds=config.episode_s,
                 seed=config.seed + 1,
+                command_interval=config.command_interval,
                 n_jobs=config.n_envs,
                 progress=True,
                 **(config.env_kwargs if policy == "expert" else {}),
@@ -225,29 +247,6 @@ class Job:
             write_json(path, known)
         kept = {key: value for key, value in known.items() if key not in ("task", "learner", "episodes", "seconds")}
         return kept | {"episodes": len(known["episodes"])}
-
-    # -- Pictures ------------------------------------------------------------------------------------------------------
-
-    def pictures(self, policy: Any, held_out: trainers.Demonstrations) -> None:
-        """Joint targets against the expert's, and a video of the student in every gait where OpenGL is to be had."""
-        figure = trainers.joint_target_figure(policy, held_out)
-        figure.savefig(self.out / "joint_targets.png", dpi=120)
-        trainers.log_figure(self.logger, "joint_targets", figure)
-        if NO_GL:
-            print(f"no videos: {NO_GL}")
-            return
-        frames = {}
-        try:
-            with self.stage("videos"):
-                for task in tqdm(self.config.tasks, "videos", unit="gait"):
-                    command = (0.8 * TASKS[task].command_range[0], 0.0, 0.0)
-                    frames[task] = trainers.record_frames(policy, task, self.config.video_s, command, **PICTURE)
-                    trainers.save_gif(frames[task], self.out / f"{task}.gif")
-        except RenderingError as error:
-            print(f"no videos: {error}")
-            return
-        mosaic = trainers.tile({task: film[::2] for task, film in frames.items()})
-        trainers.save_gif(mosaic, self.out / "gaits.gif", PICTURE["fps"] / 2)
 
     # -- Housekeeping --------------------------------------------------------------------------------------------------
 

@@ -37,7 +37,11 @@ class JobConfig:
         normalization: of inputs and outputs, see `trainers.MultiHeadPolicy`.
         batch_size: rows per gradient step.
         clone_steps, round_steps: gradient steps of cloning and of each round.
-        episodes, episode_s: of the closed-loop evaluation, per task and learner.
+        clockless_s: the student's walks that the clockless student learns the phase from, per gait; 0 makes none.
+        clockless_history: frames of proprioception that it reads.
+        clockless_steps: gradient steps of its phase estimator.
+        episodes, episode_s, command_interval: of the closed-loop evaluation, per task and learner; a new command comes
+            every so many seconds.
         round_episodes: episodes per task after each DAgger round.
         video_s: length of the videos.
 
@@ -70,8 +74,12 @@ class JobConfig:
     batch_size: int = 1024
     clone_steps: int = 6000
     round_steps: int = 2500
+    clockless_s: float = 240.0
+    clockless_history: int = 6
+    clockless_steps: int = 4000
     episodes: int = 20
-    episode_s: float = 20.0
+    episode_s: float = 30.0
+    command_interval: float = 5.0
     round_episodes: int = 4
     video_s: float = 4.0
 
@@ -97,11 +105,9 @@ class JobConfig:
         }
 
     @property
-    def taught_env_kwargs(self) -> dict[str, Any]:
-        """Of the environments that disturbed demonstrations and rounds are collected in."""
-        if not self.randomized:
-            return self.env_kwargs
-        return self.env_kwargs | {"randomization": DomainRandomization(share=self.randomized)}
+    def world(self) -> dict[str, Any]:
+        """What is different about environments in which disturbed episodes and rounds take place."""
+        return {"randomization": DomainRandomization(share=self.randomized)} if self.randomized else {}
 
     def disturbed(self, noise_rad: float) -> PerturbationConfig:
         """How a disturbed episode is disturbed, with action noise of at most `noise_rad`."""
@@ -116,6 +122,11 @@ class JobConfig:
     def literal_env_kwargs(self) -> dict[str, Any]:
         """Of the paper-literal student: the 34 numbers and the task id."""
         return self.env_kwargs | {"channels": (), "history": 1}
+
+    @property
+    def has_clock(self) -> bool:
+        """Whether the student sees a gait clock and a command, and so can do without the clock later."""
+        return {"command", "phase"} <= set(self.channels) and self.history == 1
 
     @property
     def bc(self) -> BCConfig:
@@ -147,6 +158,8 @@ PRESETS: dict[str, dict[str, Any]] = {
         "batch_size": 256,
         "clone_steps": 300,
         "round_steps": 100,
+        "clockless_s": 2.0,
+        "clockless_steps": 100,
         "episodes": 2,
         "episode_s": 5.0,
         "round_episodes": 1,

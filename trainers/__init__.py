@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from trainers.batches import TensorBatches
     from trainers.bc import BCConfig, BCHistory, BCTrainer, train_bc
     from trainers.checkpoint import CheckpointError, load
-    from trainers.clockless import ClocklessPolicy
+    from trainers.clockless import ClocklessPolicy, learn_without_clock
     from trainers.collection import CollectJob, ShardMismatchError, collect, collect_all, watch
     from trainers.collector import BlockCollector
     from trainers.dagger import DAggerConfig, DAggerTrainer
@@ -58,6 +58,7 @@ _HOME = {
     "evaluate": "evaluation",
     "evaluate_switch": "switching",
     "joint_target_figure": "figures",
+    "learn_without_clock": "clockless",
     "load": "checkpoint",
     "log_figure": "tensorboard",
     "log_round": "tensorboard",
@@ -104,6 +105,7 @@ __all__ = [
     "evaluate",
     "evaluate_switch",
     "joint_target_figure",
+    "learn_without_clock",
     "load",
     "log_figure",
     "log_round",

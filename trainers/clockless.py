@@ -1,5 +1,6 @@
 """A student without a clock: it tells the phase of its gait from what it feels."""
 
+import math
 from os import PathLike
 from typing import Any
 
@@ -7,12 +8,16 @@ import numpy as np
 import torch
 from gymnasium import spaces
 from stable_baselines3.common.policies import BasePolicy
+from tqdm.auto import tqdm
 
 from go1_mtl_gym import TASKS
 from go1_mtl_gym.clock import STAND_COMMAND
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.observation import ObservationLayout
-from trainers.phase import PhaseEstimator, unit
+from trainers.collection import EPISODE_S, watch
+from trainers.dataset import Demonstrations
+from trainers.environments import PerturbationConfig, derive_seed
+from trainers.phase import PhaseConfig, PhaseEstimator, train_phase, unit
 from trainers.policy import MultiHeadPolicy
 
 PHASE_0 = np.array([0.0, 1.0], dtype=np.float32)
@@ -151,6 +156,49 @@ class ClocklessPolicy(BasePolicy):
         if not isinstance(policy, cls):
             raise CheckpointError(f"{path} holds a {type(policy).__name__}, a {cls.__name__} was expected")
         return policy
+
+
+def learn_without_clock(
+    student: MultiHeadPolicy,
+    seconds: float = 240.0,
+    history: int = 6,
+    *,
+    correction: float = 1.0,
+    perturbation: PerturbationConfig | None = None,
+    config: PhaseConfig | None = None,
+    seed: int = 0,
+    progress: bool = False,
+    **env_kwargs: Any,
+) -> "ClocklessPolicy":
+    """Watch a student walk with its clock, and train an estimator of the phase from what it felt; no expert is asked.
+
+    Args:
+        student: a trained one.
+        seconds: watched per task [s].
+        history: frames of proprioception that the estimator reads.
+        correction: of the policy that is returned.
+        perturbation: of the walks; None is the default `PerturbationConfig`.
+        config: how to train the estimator.
+        seed: of the walks and of the initial weights.
+        progress: show bars.
+        env_kwargs: of the environment; on top of the student's own ``env_kwargs``.
+
+    Raises:
+        InvalidInputError: if the student sees no command and phase, or the seconds are not positive.
+        CollectionError: if the student keeps falling.
+    """
+    estimator = PhaseEstimator(clockless_layout(student, history), seed=seed)
+    policy = ClocklessPolicy(student, estimator, correction)
+    shards = max(1, math.ceil(seconds / EPISODE_S))
+    walks = [(task, derive_seed("watch", seed, i)) for i in range(shards) for task in estimator.layout.tasks]
+    perturbation = perturbation or PerturbationConfig()
+    watched = [
+        watch(student, task, own, seconds / shards, perturbation, history, **env_kwargs)
+        for task, own in tqdm(walks, "watch", unit="walk", disable=not progress)
+    ]
+    rows = Demonstrations.concatenate([rows for rows, _ in watched])
+    train_phase(estimator, rows, watched[0][1], config, progress)
+    return policy
 
 
 def without_phase(channels: tuple[str, ...]) -> tuple[str, ...]:
