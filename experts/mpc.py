@@ -33,7 +33,8 @@ class MPCConfig:
         input_weight: R, per squared unit of `FORCE_UNIT`.
         friction: mu of the pyramid.
         max_force: f_max of one foot [N].
-        min_force: f_min of a foot that stays on the ground throughout an interval [N]; keeps contacts from chattering.
+        min_force: f_min of a foot that stays on the ground throughout an interval [N]; keeps contacts from chattering,
+            and the lightly loaded third foot of a walk from bouncing.
         solver: "osqp", or one of the exact solvers "piqp" and "daqp" (extra ``solvers``).
         tolerance: eps_abs and eps_rel of OSQP, for its scaled problem.
         rho: ADMM step of OSQP; fixed, so that a solution depends on its problem alone.
@@ -49,7 +50,7 @@ class MPCConfig:
     input_weight: float = 0.4
     friction: float = 0.5
     max_force: float = 160.0
-    min_force: float = 10.0
+    min_force: float = 20.0
     solver: str = "osqp"
     tolerance: float = 6e-4
     rho: float = 1.4
