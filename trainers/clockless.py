@@ -17,7 +17,7 @@ from go1_mtl_gym.observation import ObservationLayout
 from go1_mtl_gym.validation import one_of
 from trainers.collection import EPISODE_S, watch
 from trainers.dataset import Demonstrations
-from trainers.environments import PerturbationConfig, derive_seed
+from trainers.environments import EnvFactory, PerturbationConfig, derive_seed, make_env
 from trainers.phase import PhaseConfig, PhaseEstimator, train_phase, unit
 from trainers.policy import MultiHeadPolicy
 
@@ -162,8 +162,9 @@ def learn_without_clock(
     config: PhaseConfig | None = None,
     seed: int = 0,
     progress: bool = False,
+    make_env: EnvFactory = make_env,
     **env_kwargs: Any,
-) -> "ClocklessPolicy":
+) -> ClocklessPolicy:
     """Watch a student walk with its clock, and train an estimator of the phase from what it felt; no expert is asked.
 
     Args:
@@ -175,10 +176,11 @@ def learn_without_clock(
         config: how to train the estimator.
         seed: of the walks and of the initial weights.
         progress: show bars.
+        make_env: another environment factory.
         env_kwargs: of the environment; on top of the student's own ``env_kwargs``.
 
     Raises:
-        InvalidInputError: if the student sees no command and phase, or the seconds are not positive.
+        InvalidInputError: if the student sees no command and phase, or a figure is outside its range.
         CollectionError: if the student keeps falling.
     """
     estimator = PhaseEstimator(clockless_layout(student, history), seed=seed)
@@ -187,7 +189,7 @@ def learn_without_clock(
     walks = [(task, derive_seed("watch", seed, i)) for i in range(shards) for task in estimator.layout.tasks]
     perturbation = perturbation or PerturbationConfig()
     watched = [
-        watch(student, task, own, seconds / shards, perturbation, history, **env_kwargs)
+        watch(student, task, own, seconds / shards, perturbation, history, make_env=make_env, **env_kwargs)
         for task, own in tqdm(walks, "watch", unit="walk", disable=not progress)
     ]
     rows = Demonstrations.concatenate([rows for rows, _ in watched])
