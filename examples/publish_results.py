@@ -1,6 +1,6 @@
 """Put the numbers of a run where visitors see them: ``docs/results/`` and the marked blocks of ``README.md``.
 
-    python examples/publish_results.py RUN_DIR      copy a run of examples/dagger.py, then write both
+    python examples/publish_results.py RUN_DIR      copy a run of examples/dagger.py and its students, then write both
     python examples/publish_results.py              write both from what docs/results/ holds already
     python examples/publish_results.py --check      change nothing; fail if README.md or the page is out of date
 
@@ -29,6 +29,9 @@ from trainers.report import benchmark_table, markdown, paper_table, results_tabl
 ROOT = Path(__file__).resolve().parents[1]
 COPIED = ("joint_targets.png", "gaits.gif")
 """Files of a run that are published as they are, next to ``metrics.json``."""
+STUDENTS = {"policy.zip": "clocked.zip", "clockless.zip": "clockless.zip"}
+"""Policies of a run, and their names in ``trainers/assets/``, from where `trainers.load_pretrained` reads them."""
+PUBLISHED_PRESET = "default"
 FOLDERS = ("--out", "--out-dir", "--parts")
 """Options of a command that say where its files go."""
 SETTINGS = {
@@ -55,13 +58,19 @@ OF_ROUNDS = ("dagger_s", "round_steps")
 # -- A run's files -----------------------------------------------------------------------------------------------------
 
 
-def copy_run(run: Path, results: Path) -> None:
+def copy_run(run: Path, root: Path) -> None:
     """Copy what is published of a run; the output folder, which only its machine knows, is cut from the command.
 
+    Args:
+        run: output folder of the main job.
+        root: of the checkout; results go to ``docs/results``, students to ``trainers/assets``.
+
     Raises:
-        InvalidInputError: if files are missing (all are named) or the metrics cannot be read.
+        InvalidInputError: if files are missing (all are named), the metrics cannot be read, or the run is not one of
+            the preset that is published.
     """
-    missing = [name for name in ("metrics.json", *COPIED) if not (run / name).is_file()]
+    results, students = root / "docs" / "results", root / "trainers" / "assets"
+    missing = [name for name in ("metrics.json", *COPIED, *STUDENTS) if not (run / name).is_file()]
     if missing:
         raise InvalidInputError(
             f"{run} lacks {', '.join(missing)}; expected the --out folder of a finished examples/dagger.py"
@@ -69,10 +78,16 @@ def copy_run(run: Path, results: Path) -> None:
         )
     metrics = read_json(run / "metrics.json")
     results_table(metrics)
+    preset = metrics.get("config", {}).get("preset")
+    if preset != PUBLISHED_PRESET:
+        raise InvalidInputError(f"a run of the preset {PUBLISHED_PRESET!r} was expected, {run} is one of {preset!r}")
     metrics["command"] = without_out(metrics.get("command", "python examples/dagger.py"))
     write_json(results / "metrics.json", metrics)
     for name in COPIED:
         shutil.copyfile(run / name, results / name)
+    students.mkdir(parents=True, exist_ok=True)
+    for name, published in STUDENTS.items():
+        shutil.copyfile(run / name, students / published)
 
 
 def read_json(path: Path) -> dict[str, Any]:
@@ -258,7 +273,7 @@ def main(arguments: list[str] | None = None, root: Path = ROOT) -> int:
     try:
         pages(root)  # a README without markers is an error before anything is copied
         if options.run is not None and not options.check:
-            copy_run(options.run, root / "docs" / "results")
+            copy_run(options.run, root)
         texts = pages(root)
     except InvalidInputError as error:
         print(f"error: {error}", file=sys.stderr)

@@ -50,27 +50,6 @@ class LinearModel:
     c: np.ndarray
 
 
-def cross_matrix(r: np.ndarray) -> np.ndarray:
-    """[r] with [r] f = r x f, shape (3, 3)."""
-    out = np.empty((3, 3))
-    _cross(np.asarray(r, dtype=np.float64), out, 1.0)
-    return out
-
-
-def rotation_matrix(rpy: np.ndarray) -> np.ndarray:
-    """R = Rz(yaw) Ry(pitch) Rx(roll), body to world, shape (3, 3)."""
-    out = np.empty((3, 3))
-    _rotation(np.asarray(rpy, dtype=np.float64), out)
-    return out
-
-
-def euler_rate_matrix(rpy: np.ndarray) -> np.ndarray:
-    """E of equation (1), shape (3, 3), from roll, pitch, yaw [rad] of shape (3,)."""
-    E, W = np.empty((3, 3)), np.empty((3, 3))
-    _euler_rates(np.asarray(rpy, dtype=np.float64), np.zeros(3), E, W)
-    return E
-
-
 def linearise(
     states: np.ndarray, inputs: np.ndarray, feet_w: np.ndarray, inertia_b: np.ndarray, dt: float
 ) -> LinearModel:

@@ -97,10 +97,6 @@ class Gait:
         """Which legs should be on the ground; bool, shape of `phase` + (4,)."""
         return self.leg_phase(phase) < self.duty
 
-    def swing_progress(self, phase: float | np.ndarray) -> np.ndarray:
-        """How much of the swing is over, 0 at lift-off and during stance, towards 1 at touchdown."""
-        return np.maximum(self.leg_phase(phase) - self.duty, 0.0) / (1.0 - self.duty)
-
     def contact_schedule(self, phase: float, dt: float, steps: int) -> np.ndarray:
         """Share of each coming interval that a leg spends on the ground.
 

@@ -128,6 +128,10 @@ class ObservationLayout:
         self.size = int(ends[-1])
         self.low, self.high = self._bounds()
 
+    def __reduce__(self) -> tuple[type["ObservationLayout"], tuple[object, ...]]:
+        """Copies and pickles are built anew: views of dictionaries, such as `slices`, cannot be pickled."""
+        return ObservationLayout, (self.tasks, self.channels, self.history)
+
     def _bounds(self) -> tuple[np.ndarray, np.ndarray]:
         high = np.ones(self.size)
         for name, where in self.slices.items():

@@ -75,9 +75,10 @@ def test_smoke_writes_the_metrics_that_others_read(smoke):
         assert set(learners["expert"]) >= CLOSED_LOOP
         for name in ("multi_head", "pooled", "paper_literal"):
             assert set(learners[name]) >= CLOSED_LOOP | ONE_STEP
+        assert set(learners["clockless"]) >= CLOSED_LOOP and not set(learners["clockless"]) & ONE_STEP
         assert learners["expert"]["survival_rate"] == 1.0
     assert metrics["seed"] == 0 and metrics["config"]["preset"] == "smoke"
-    assert {"demonstrations", "clone", "dagger", "baselines", "evaluation"} <= set(metrics["seconds"])
+    assert {"demonstrations", "clone", "dagger", "clockless", "baselines", "evaluation"} <= set(metrics["seconds"])
     assert metrics["versions"]["mujoco"]
 
 
@@ -85,7 +86,8 @@ def test_smoke_writes_the_metrics_that_others_read(smoke):
 def test_smoke_prints_one_table_per_gait_and_leaves_its_files(smoke):
     out, output = smoke
     assert all(task in output for task in PAPER_TASKS) and "R2" in output
-    for name in ("policy.zip", "joint_targets.png", "table.md", "config.json"):
+    assert output.count("the same without a clock") == len(PAPER_TASKS)
+    for name in ("policy.zip", "clockless.zip", "joint_targets.png", "table.md", "config.json"):
         assert (out / name).stat().st_size > 0
     assert list((out / "tensorboard").glob("events.*"))
 
@@ -98,14 +100,26 @@ def test_smoke_films_every_gait(smoke):
 
 
 @pytest.mark.slow
-def test_the_saved_policy_drives_its_environment(smoke):
+@pytest.mark.parametrize("name", ["policy.zip", "clockless.zip"])
+def test_the_saved_policies_drive_their_environments(smoke, name):
     import trainers
 
-    policy = trainers.load(smoke[0] / "policy.zip")
+    policy = trainers.load(smoke[0] / name)
     env = trainers.make_env("bound", **policy.env_kwargs)
     obs, _ = env.reset(seed=0)
     action, _ = policy.predict(obs, deterministic=True)
     assert env.action_space.contains(action)
+
+
+@pytest.mark.slow
+def test_the_clockless_student_is_the_student_with_an_estimate_of_the_phase(smoke):
+    import trainers
+
+    student, clockless = (trainers.load(smoke[0] / name) for name in ("policy.zip", "clockless.zip"))
+    kept, given = clockless.student.state_dict(), student.state_dict()
+    assert kept.keys() == given.keys() and all(bool((kept[name] == given[name]).all()) for name in given)
+    assert "phase" not in clockless.env_kwargs["channels"] and clockless.env_kwargs["history"] == 6
+    assert clockless.correction == 1.0
 
 
 @pytest.mark.slow

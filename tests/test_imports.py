@@ -7,6 +7,7 @@ import json
 import re
 import subprocess
 import sys
+import tarfile
 import zipfile
 from pathlib import Path
 
@@ -90,19 +91,30 @@ def test_one_version_everywhere():
     assert go1_mtl_gym.__version__ == declared_version()
 
 
-def test_the_wheel_holds_the_packages_and_the_model(tmp_path):
+def packaged() -> set[str]:
+    """The modules, models and policies of the packages, relative to the root."""
+    files = (path for package in FORBIDDEN for path in (ROOT / package).rglob("*"))
+    return {path.relative_to(ROOT).as_posix() for path in files if path.suffix in {".py", ".xml", ".zip"}}
+
+
+def built(target: str, folder: Path) -> Path:
+    """A distribution made by hatchling."""
     pytest.importorskip("hatchling")
-    command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)]
+    command = [sys.executable, "-m", "hatchling", "build", "-t", target, "-d", str(folder)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
-    with zipfile.ZipFile(next(tmp_path.glob("*.whl"))) as wheel:
+    return next(folder.iterdir())
+
+
+def test_the_wheel_holds_the_packages_the_model_and_the_policies(tmp_path):
+    with zipfile.ZipFile(built("wheel", tmp_path)) as wheel:
         names = set(wheel.namelist())
-    kept = {
-        path.relative_to(ROOT).as_posix()
-        for package in FORBIDDEN
-        for path in (ROOT / package).rglob("*")
-        if path.suffix in {".py", ".xml"}
-    }
-    assert "go1_mtl_gym/assets/go1.xml" in kept
-    assert kept <= names
+    assert "go1_mtl_gym/assets/go1.xml" in packaged()
+    assert packaged() <= names
     assert {name.partition("/")[0] for name in names if ".dist-info/" not in name} == set(FORBIDDEN)
+
+
+def test_the_source_distribution_holds_them_too(tmp_path):
+    with tarfile.open(built("sdist", tmp_path)) as sdist:
+        names = {name.partition("/")[2] for name in sdist.getnames()}
+    assert packaged() <= names

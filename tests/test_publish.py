@@ -53,6 +53,8 @@ def run(tmp_path):
     (folder / "metrics.json").write_text(json.dumps(METRICS))
     (folder / "joint_targets.png").write_bytes(b"png")
     (folder / "gaits.gif").write_bytes(b"gif")
+    (folder / "policy.zip").write_bytes(b"student")
+    (folder / "clockless.zip").write_bytes(b"without a clock")
     return folder
 
 
@@ -71,6 +73,8 @@ def test_a_run_becomes_the_page_and_the_blocks(run, root):
         "README.md", "gaits.gif", "joint_targets.png", "metrics.json",
     ]  # fmt: skip
     assert (results / "gaits.gif").read_bytes() == b"gif"
+    students = {path.name: path.read_bytes() for path in (root / "trainers" / "assets").iterdir()}
+    assert students == {"clocked.zip": b"student", "clockless.zip": b"without a clock"}
     page, readme = (path.read_text(encoding="utf-8") for path in (results / "README.md", root / "README.md"))
     for text in (page, readme):
         assert "| trot | multi-head student | 0.001200 | 0.0120 | 0.9877 | 19/20 | 20/20 | 0.031 | 2.50 |" in text
@@ -134,13 +138,21 @@ def test_check_writes_nothing(root, capsys):
     assert (root / "README.md").read_text(encoding="utf-8") == before
 
 
-@pytest.mark.parametrize("name", ["metrics.json", "joint_targets.png", "gaits.gif"])
+@pytest.mark.parametrize("name", ["metrics.json", "joint_targets.png", "gaits.gif", "policy.zip", "clockless.zip"])
 def test_a_missing_file_is_named(run, root, name, capsys):
     (run / name).unlink()
     assert publish.main([str(run)], root) == 2
     error = capsys.readouterr().err
     assert name in error and str(run) in error and ("OpenGL" in error) == (name == "gaits.gif")
-    assert not (root / "docs").exists()
+    assert not (root / "docs").exists() and not (root / "trainers").exists()
+
+
+@pytest.mark.parametrize("config", [{"preset": "smoke"}, {"preset": "paper"}, {}])
+def test_a_run_of_another_preset_is_refused(run, root, config, capsys):
+    (run / "metrics.json").write_text(json.dumps(METRICS | {"config": config}))
+    assert publish.main([str(run)], root) == 2
+    assert f"'default' was expected, {run} is one of {config.get('preset')!r}" in capsys.readouterr().err
+    assert not (root / "docs").exists() and not (root / "trainers").exists()
 
 
 def test_damaged_metrics_are_refused(run, root, capsys):

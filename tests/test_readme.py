@@ -10,7 +10,7 @@ import pytest
 from experts import MPCConfig
 from go1_mtl_gym import clock, episode, robot, termination
 from go1_mtl_gym import env as environment
-from trainers import MultiHeadPolicy, evaluation, make_env
+from trainers import MultiHeadPolicy, make_env, scoring
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -91,10 +91,10 @@ def test_named_options_exist(monkeypatch):
 
 def test_figures_in_the_text_are_the_codes():
     assert f"N = {MPCConfig().steps} intervals" in PROSE
-    assert f"at most {evaluation.VELOCITY_TOLERANCE} m/s" in PROSE
-    assert f"within {100 * evaluation.STEP_RATE_TOLERANCE:.0f} % of the gait's" in PROSE
-    assert f"after the first {evaluation.SETTLE_S:g} s" in PROSE
-    assert evaluation.MIN_AIR_SHARE == 0.5 and "at least half of its planned swing" in PROSE
+    assert f"at most {scoring.VELOCITY_TOLERANCE} m/s" in PROSE
+    assert f"within {100 * scoring.STEP_RATE_TOLERANCE:.0f} % of the gait's" in PROSE
+    assert f"after the first {scoring.SETTLE_S:g} s" in PROSE
+    assert scoring.MIN_AIR_SHARE == 0.5 and "at least half of its planned swing" in PROSE
     assert f"trunk below {termination.FALLEN_HEIGHT} m" in PROSE
     tilt = np.degrees(np.arccos(termination.FALLEN_COSINE))
     assert f"tilted by more than {tilt:.0f} degrees" in PROSE

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from trainers.metrics import offline_metrics
     from trainers.phase import PhaseConfig, PhaseEstimator, phase_errors, train_phase
     from trainers.policy import MultiHeadPolicy
+    from trainers.pretrained import load_pretrained
     from trainers.recording import record_frames, save_gif, tile
     from trainers.report import paper_table, results_table
     from trainers.scoring import ClosedLoopResult, EpisodeRecord
@@ -60,6 +61,7 @@ _HOME = {
     "joint_target_figure": "figures",
     "learn_without_clock": "clockless",
     "load": "checkpoint",
+    "load_pretrained": "pretrained",
     "log_figure": "tensorboard",
     "log_round": "tensorboard",
     "log_text": "tensorboard",
@@ -107,6 +109,7 @@ __all__ = [
     "joint_target_figure",
     "learn_without_clock",
     "load",
+    "load_pretrained",
     "log_figure",
     "log_round",
     "log_text",

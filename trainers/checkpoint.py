@@ -1,4 +1,7 @@
-"""Policies on disk: one zip of ``policy.json`` and ``weights.safetensors``; reading it executes no code."""
+"""Policies on disk: one zip of ``policy.json`` and safetensors files; reading it executes no code.
+
+``weights.safetensors`` holds the student, ``phase.safetensors`` the phase estimator of a clockless one.
+"""
 
 import json
 import math
@@ -6,7 +9,7 @@ import zipfile
 from importlib.metadata import PackageNotFoundError, version
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
 
 import numpy as np
 import safetensors.torch
@@ -20,6 +23,7 @@ if TYPE_CHECKING:
     from trainers.clockless import ClocklessPolicy
     from trainers.policy import MultiHeadPolicy
 
+P = TypeVar("P")
 FORMAT = "go1-mtl-gym policy"
 FORMAT_VERSION = 1
 WEIGHTS = "weights.safetensors"
@@ -106,6 +110,22 @@ def load(path: str | PathLike[str], device: torch.device | str = "cpu") -> "Mult
     return policy
 
 
+def load_as(kind: type[P], path: str | PathLike[str], device: torch.device | str = "cpu") -> P:
+    """Read a policy of one class.
+
+    Args:
+        kind: `MultiHeadPolicy` or `ClocklessPolicy`.
+        path, device: as in `load`.
+
+    Raises:
+        CheckpointError: as in `load`, or if the file holds the other one.
+    """
+    policy = load(path, device)
+    if not isinstance(policy, kind):
+        raise CheckpointError(f"{path} holds a {type(policy).__name__}, a {kind.__name__} was expected")
+    return policy
+
+
 def _clockless(
     student: "MultiHeadPolicy", description: dict[str, Any], weights: dict[str, torch.Tensor]
 ) -> "ClocklessPolicy":
@@ -146,7 +166,7 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, dict[str, torch.Tensor]
                     "reads what PPO.save wrote)"
                 )
             description = json.loads(archive.read("policy.json"))
-            files = [name for name in archive.namelist() if name in (WEIGHTS, PHASE_WEIGHTS)]
+            files = [name for name in (WEIGHTS, PHASE_WEIGHTS) if name in archive.namelist()]
             weights = {name: safetensors.torch.load(archive.read(name)) for name in files}
     except CheckpointError:
         raise
@@ -157,6 +177,9 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, dict[str, torch.Tensor]
     if description.get("format_version") != FORMAT_VERSION:
         got = description.get("format_version")
         raise CheckpointError(f"{path} has format version {got!r}; this package reads {FORMAT_VERSION}")
+    wanted = [WEIGHTS, PHASE_WEIGHTS] if "clockless" in description else [WEIGHTS]
+    if files != wanted:
+        raise CheckpointError(f"{path} is damaged: expected the weights {wanted} in it, got {files}")
     return description, weights
 
 

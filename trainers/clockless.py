@@ -14,9 +14,10 @@ from go1_mtl_gym import TASKS
 from go1_mtl_gym.clock import STAND_COMMAND
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.observation import ObservationLayout
+from go1_mtl_gym.validation import one_of
 from trainers.collection import EPISODE_S, watch
 from trainers.dataset import Demonstrations
-from trainers.environments import PerturbationConfig, derive_seed
+from trainers.environments import EnvFactory, PerturbationConfig, derive_seed, make_env
 from trainers.phase import PhaseConfig, PhaseEstimator, train_phase, unit
 from trainers.policy import MultiHeadPolicy
 
@@ -42,7 +43,8 @@ class ClocklessPolicy(BasePolicy):
         correction: in (0, 1].
 
     Raises:
-        InvalidInputError: if the two do not fit together, or the correction is outside its range.
+        InvalidInputError: if the two do not fit together, a task is not registered, or the correction is outside its
+            range.
     """
 
     def __init__(self, student: MultiHeadPolicy, estimator: PhaseEstimator, correction: float = 1.0) -> None:
@@ -57,6 +59,8 @@ class ClocklessPolicy(BasePolicy):
             )
         if not 0 < correction <= 1:
             raise InvalidInputError(f"correction must lie in (0, 1], got {correction!r}")
+        for name in layout.tasks:
+            one_of(name, tuple(TASKS), "task")
         super().__init__(spaces.Box(layout.low, layout.high, dtype=np.float32), student.action_space)
         self.student = student
         self.estimator = estimator
@@ -84,11 +88,12 @@ class ClocklessPolicy(BasePolicy):
             observation: of any mix of tasks.
             state: what the last call returned for the same environments: clocks (n, 2) and task indices (n,); None at
                 the beginning.
-            episode_start: True where an episode begins, bool, shape (n,).
+            episode_start: True where an episode begins, bool, shape (n,); None where none does.
             deterministic: without exploration noise.
 
         Raises:
-            InvalidInputError: if an observation has another size or is not finite, or does not end in a task id.
+            InvalidInputError: if an observation has another size or is not finite, or does not end in a task id; with a
+                correction below 1 also if the state is that of another number of environments.
         """
         obs = np.asarray(observation, dtype=np.float32)
         rows = obs.reshape(-1, obs.shape[-1])
@@ -100,26 +105,18 @@ class ClocklessPolicy(BasePolicy):
         task = rows[:, -self.n_tasks :].argmax(axis=1)
         clock = self.estimator.estimate(rows)
         if self.correction < 1:
-            kept = self._running_clock(rows, task, state, episode_start)
-            clock = unit((1 - self.correction) * kept + self.correction * clock)
+            before, anew = _memory(task, state, episode_start)
+            later = np.where(anew, 0.0, before + self._turn[task])
+            clock = unit((1 - self.correction) * _sine_cosine(later) + self.correction * clock)
+            clock[self._rests(rows, task, before, _turns(clock))] = PHASE_0
         actions, _ = self.student.predict(self._with_clock(rows, clock), deterministic=deterministic)
-        return actions.reshape(*obs.shape[:-1], -1), (clock, task)
+        return actions.reshape(*obs.shape[:-1], actions.shape[-1]), (clock, task)
 
-    def _running_clock(
-        self, rows: np.ndarray, task: np.ndarray, state: tuple[np.ndarray, ...] | None, starts: np.ndarray | None
-    ) -> np.ndarray:
-        """The clocks one period later, (n, 2); at phase 0 where an episode or a task begins or the robot stands."""
-        if state is None:
-            return np.tile(PHASE_0, (len(rows), 1))
-        clock, before = state
-        turns = np.arctan2(clock[:, 0], clock[:, 1]) / (2 * np.pi) % 1.0
-        later = turns + self._turn[task]
-        stands = (np.abs(rows[:, self._command]) < STAND_COMMAND).all(axis=1) & self._can_stand[task]
-        anew = (task != before) | (stands & (later >= 1.0))
-        if starts is not None:
-            anew |= np.asarray(starts, dtype=bool)
-        angle = 2 * np.pi * np.where(anew, 0.0, later)
-        return np.stack([np.sin(angle), np.cos(angle)], axis=1).astype(np.float32)
+    def _rests(self, rows: np.ndarray, task: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+        """Where a clock rests at phase 0: the command asks for it, and the clock was there or has come past it."""
+        asked = (np.abs(rows[:, self._command]) < STAND_COMMAND).all(axis=1) & self._can_stand[task]
+        forward = (after - before) % 1.0 < 0.5
+        return asked & ((before == 0.0) | (forward & (after < before)))
 
     def _with_clock(self, rows: np.ndarray, clock: np.ndarray) -> np.ndarray:
         """The student's observations."""
@@ -150,12 +147,9 @@ class ClocklessPolicy(BasePolicy):
         Raises:
             CheckpointError: if the file is missing, damaged, or something else.
         """
-        from trainers.checkpoint import CheckpointError, load
+        from trainers.checkpoint import load_as
 
-        policy = load(path, device)
-        if not isinstance(policy, cls):
-            raise CheckpointError(f"{path} holds a {type(policy).__name__}, a {cls.__name__} was expected")
-        return policy
+        return load_as(ClocklessPolicy, path, device)
 
 
 def learn_without_clock(
@@ -168,8 +162,9 @@ def learn_without_clock(
     config: PhaseConfig | None = None,
     seed: int = 0,
     progress: bool = False,
+    make_env: EnvFactory = make_env,
     **env_kwargs: Any,
-) -> "ClocklessPolicy":
+) -> ClocklessPolicy:
     """Watch a student walk with its clock, and train an estimator of the phase from what it felt; no expert is asked.
 
     Args:
@@ -181,10 +176,11 @@ def learn_without_clock(
         config: how to train the estimator.
         seed: of the walks and of the initial weights.
         progress: show bars.
+        make_env: another environment factory.
         env_kwargs: of the environment; on top of the student's own ``env_kwargs``.
 
     Raises:
-        InvalidInputError: if the student sees no command and phase, or the seconds are not positive.
+        InvalidInputError: if the student sees no command and phase, or a figure is outside its range.
         CollectionError: if the student keeps falling.
     """
     estimator = PhaseEstimator(clockless_layout(student, history), seed=seed)
@@ -193,7 +189,7 @@ def learn_without_clock(
     walks = [(task, derive_seed("watch", seed, i)) for i in range(shards) for task in estimator.layout.tasks]
     perturbation = perturbation or PerturbationConfig()
     watched = [
-        watch(student, task, own, seconds / shards, perturbation, history, **env_kwargs)
+        watch(student, task, own, seconds / shards, perturbation, history, make_env=make_env, **env_kwargs)
         for task, own in tqdm(walks, "watch", unit="walk", disable=not progress)
     ]
     rows = Demonstrations.concatenate([rows for rows, _ in watched])
@@ -228,6 +224,31 @@ def student_layout(policy: Any) -> ObservationLayout:
             f"{policy.observation_space.shape}"
         )
     return layout
+
+
+def _memory(
+    task: np.ndarray, state: tuple[np.ndarray, ...] | None, starts: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """The clocks before this period [cycles], and where they begin anew, at phase 0; each of shape (n,)."""
+    if state is None:
+        return np.zeros(len(task)), np.ones(len(task), dtype=bool)
+    clock, earlier = state
+    if len(earlier) != len(task):
+        raise InvalidInputError(f"a state of {len(task)} environments was expected, got one of {len(earlier)}")
+    anew = task != earlier
+    if starts is not None:
+        anew |= np.asarray(starts, dtype=bool)
+    return np.where(anew, 0.0, _turns(clock)), anew
+
+
+def _turns(clock: np.ndarray) -> np.ndarray:
+    """The phases [cycles] of sines and cosines of shape (n, 2)."""
+    return np.arctan2(clock[:, 0], clock[:, 1]) / (2 * np.pi) % 1.0
+
+
+def _sine_cosine(turns: np.ndarray) -> np.ndarray:
+    """Sines and cosines, shape (n, 2), of phases [cycles]."""
+    return np.stack([np.sin(2 * np.pi * turns), np.cos(2 * np.pi * turns)], axis=1)
 
 
 def _columns(layout: ObservationLayout, clocked: ObservationLayout) -> np.ndarray:

@@ -28,7 +28,7 @@ class ShardMismatchError(InvalidInputError):
 
 
 class CollectionError(Go1Error):
-    """The expert falls so often that the seconds asked for cannot be had."""
+    """The driver falls so often that the seconds asked for cannot be had."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -127,8 +127,12 @@ def watch(
         The rows, and the layout of their observations.
 
     Raises:
+        InvalidInputError: if the policy sees several frames, the seed is negative or the seconds are not positive.
         CollectionError: if falls leave less than a fifth of the steps.
     """
+    frames = policy.env_kwargs.get("history", 1)
+    if frames != 1:
+        raise InvalidInputError(f"a policy of one frame of proprioception was expected, got one of {frames}")
     job = CollectJob(task, seed, seconds, None, perturbation, {**policy.env_kwargs, "history": history, **env_kwargs})
     env = make_env(task, perturbation, **{"episode_s": EPISODE_S, **job.env_kwargs})
     layout = env.unwrapped.layout

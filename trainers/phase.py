@@ -131,6 +131,9 @@ def phase_errors(
     Args:
         estimator: a trained one.
         rows, layout: as in `train_phase`.
+
+    Raises:
+        InvalidInputError: if the layouts do not fit, or there are no rows.
     """
     seen, target = _inputs_and_phase(estimator, rows, layout)
     (sin, cos), (true_sin, true_cos) = estimator.estimate(seen).T, target.T

@@ -243,9 +243,9 @@ class MultiHeadPolicy(ActorCriticPolicy):
         Raises:
             CheckpointError: if the file is missing, damaged, or something else.
         """
-        from trainers.checkpoint import load
+        from trainers.checkpoint import load_as
 
-        return load(path, device)
+        return load_as(MultiHeadPolicy, path, device)
 
 
 def _seeded(seed: int | None) -> contextlib.AbstractContextManager[Any]:

@@ -29,7 +29,6 @@ def test_trot_by_hand():
     assert trot.stance(0.2).tolist() == [True, False, False, True]
     assert trot.stance(0.52).tolist() == [True, True, True, True]
     assert trot.stance(0.6).tolist() == [False, True, True, False]
-    np.testing.assert_allclose(trot.swing_progress(0.2), [0, 0.15 / 0.45, 0.15 / 0.45, 0])
     assert (trot.stance_s, trot.swing_s, trot.step_rate) == pytest.approx((0.22, 0.18, 2.5))
 
 
@@ -37,7 +36,6 @@ def test_walk_by_hand():
     walk = GAITS["walk"]  # duty .78, offsets FL .25 FR .75 RL 0 RR .5
     np.testing.assert_allclose(walk.leg_phase(0.1), [0.35, 0.85, 0.1, 0.6])
     assert walk.stance(0.1).tolist() == [True, False, True, True]
-    np.testing.assert_allclose(walk.swing_progress(0.1)[1], 0.07 / 0.22)
 
 
 def test_walk_is_four_beat():
@@ -110,16 +108,6 @@ def test_phase_is_periodic(gait):
     np.testing.assert_allclose(gait.leg_phase(phase + 3), gait.leg_phase(phase), atol=1e-12)
     np.testing.assert_allclose(gait.leg_phase(phase - 3), gait.leg_phase(phase), atol=1e-12)
     assert gait.leg_phase(phase).shape == (50, 4) and gait.leg_phase(0.3).shape == (4,)
-
-
-@EVERY
-def test_swing_progress_is_zero_in_stance_and_rises_to_one(gait):
-    phase = np.arange(5000) / 5000
-    progress, stance = gait.swing_progress(phase), gait.stance(phase)
-    assert (progress[stance] == 0).all()
-    assert progress[~stance].max() == pytest.approx(1.0, abs=2e-3) and progress.max() <= 1
-    slope = np.diff(progress, axis=0)[~stance[1:] & ~stance[:-1]]
-    np.testing.assert_allclose(slope, 1 / 5000 / (1 - gait.duty), rtol=1e-6)
 
 
 @EVERY

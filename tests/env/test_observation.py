@@ -1,6 +1,8 @@
 """The layout of the flat observation: slices, order, bounds, one-hot, history and clipping."""
 
+import copy
 import itertools
+import pickle
 
 import numpy as np
 import pytest
@@ -25,6 +27,14 @@ def test_default_is_the_papers_34_numbers_and_the_task():
         "accelerometer": (0, 3), "gyroscope": (3, 6), "q": (6, 18), "dq": (18, 30), "contacts": (30, 34),
         "task": (34, 38),
     }  # fmt: skip
+
+
+@pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda layout: pickle.loads(pickle.dumps(layout))])
+def test_copies_are_equal(duplicate):
+    layout = ObservationLayout(TASKS, ("phase", "command"), 3)
+    other = duplicate(layout)
+    assert (other.tasks, other.channels, other.history) == (layout.tasks, layout.channels, layout.history)
+    assert other.slices == layout.slices and np.array_equal(other.high, layout.high)
 
 
 @pytest.mark.parametrize("count", range(5))

@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from experts.dynamics import FORCE_UNIT, LinearModel, cross_matrix, euler_rate_matrix, linearise, rotation_matrix
+from experts.dynamics import FORCE_UNIT, LinearModel, _cross, _euler_rates, _rotation, linearise
 from go1_mtl_gym import robot
 
 INERTIA_B = np.array([[0.127, 0.001, -0.015], [0.001, 0.394, 0.002], [-0.015, 0.002, 0.423]])
@@ -17,6 +17,27 @@ INPUT = np.array([[4.0, -9.0, 55.0], [0, 3.0, 10.0], [-5.0, 0, 20.0], [2.0, 7.0,
 def at_point(dt: float, x: np.ndarray = POINT, u: np.ndarray = INPUT) -> LinearModel:
     """The model of an interval in which the trajectory rests at one point."""
     return linearise(np.array([x, x]), u[None], FEET[None], INERTIA_B, dt)
+
+
+def cross_matrix(r: np.ndarray) -> np.ndarray:
+    """[r] with [r] f = r x f, shape (3, 3)."""
+    out = np.empty((3, 3))
+    _cross(r, out, 1.0)
+    return out
+
+
+def rotation_matrix(rpy: np.ndarray) -> np.ndarray:
+    """R = Rz(yaw) Ry(pitch) Rx(roll), body to world, shape (3, 3)."""
+    out = np.empty((3, 3))
+    _rotation(rpy, out)
+    return out
+
+
+def euler_rate_matrix(rpy: np.ndarray) -> np.ndarray:
+    """E of the model's equation (1), shape (3, 3)."""
+    E, W = np.empty((3, 3)), np.empty((3, 3))
+    _euler_rates(rpy, np.zeros(3), E, W)
+    return E
 
 
 def rotation(rpy: np.ndarray) -> np.ndarray:

@@ -2,6 +2,7 @@ import pytest
 import torch
 from stable_baselines3.common.vec_env import DummyVecEnv
 
+from go1_mtl_gym import PAPER_TASKS
 from tests.trainer.stub_env import StubEnv
 from trainers import Demonstrations, MultiHeadPolicy, collect
 
@@ -17,6 +18,13 @@ def policy() -> MultiHeadPolicy:
     generator = torch.Generator().manual_seed(0)
     for head in policy.actor.heads:  # away from the small initial outputs, so that heads differ visibly
         torch.nn.init.normal_(head[-1].weight, generator=generator)
+    return policy
+
+
+@pytest.fixture
+def student(policy: MultiHeadPolicy) -> MultiHeadPolicy:
+    """The same, with all that a policy without a clock wants to know of it."""
+    policy.env_kwargs |= {"tasks": PAPER_TASKS, "channels": ("command", "phase", "last_action")}
     return policy
 
 

@@ -4,6 +4,7 @@ The action's meaning is made up so that tests can script behaviour: hips 0, 3, 6
 rate), a thigh above 0.5 lifts its leg, the first knee above 0.95 makes the robot fall. Joints lag behind.
 """
 
+from collections import deque
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 
 from go1_mtl_gym import PAPER_TASKS, TASKS, PerturbationWrapper, Task
 from go1_mtl_gym.actuation import ActionMap
+from go1_mtl_gym.observation import FRAME_SIZE, ObservationLayout
 from trainers.environments import ExpertAccess, PerturbationConfig
 
 HIPS, THIGHS, KNEES = slice(0, 7, 3), slice(1, 12, 3), slice(2, 12, 3)
@@ -48,11 +50,14 @@ class StubEnv(gymnasium.Env):
         episode_s: float = 30.0,
         control_hz: int = 50,
         expert_falls_after_s: float = np.inf,
+        channels: tuple[str, ...] = ("command", "phase", "last_action"),
+        history: int = 1,
         **_: Any,
     ) -> None:
         self.tasks, self.control_hz, self.control_s = tuple(tasks), control_hz, 1 / control_hz
         self.first_task = self.task = TASKS[task]
-        self.observation_space = gymnasium.spaces.Box(-50, 50, (SIZE + len(tasks),), np.float32)
+        self.layout = ObservationLayout(self.tasks, channels, history)
+        self.observation_space = gymnasium.spaces.Box(-50, 50, (self.layout.size,), np.float32)
         self.action_space = gymnasium.spaces.Box(-1, 1, (12,), np.float32)
         self.action_map = ActionMap(center=np.tile([0.0, 0.9, -1.8], 4), half_range=np.linspace(0.5, 1.6, 12))
         self.falls_after = expert_falls_after_s
@@ -67,6 +72,8 @@ class StubEnv(gymnasium.Env):
         self.filtered = np.zeros(3)
         self.q = self.np_random.uniform(-0.1, 0.1, 12)
         self.phase, self.steps, self.last_action = 0.0, 0, np.zeros(12)
+        older = self.layout.history - 1
+        self.frames = deque([np.zeros(FRAME_SIZE)] * older, older)
         return self.observe(), self.info(False)
 
     @property
@@ -106,10 +113,11 @@ class StubEnv(gymnasium.Env):
 
     def observe(self) -> np.ndarray:
         turn = 2 * np.pi * self.phase
-        one_hot = np.eye(len(self.tasks))[self.tasks.index(self.task.name)]
-        parts = [np.zeros(6), self.q, np.zeros(12), self.last_action[THIGHS] <= 0.5, self.filtered]
-        parts += [[np.sin(turn), np.cos(turn)], self.last_action, one_hot]
-        return np.concatenate(parts).astype(np.float32)
+        parts = {"q": self.q, "contacts": self.last_action[THIGHS] <= 0.5, "command": self.filtered}
+        parts |= {"phase": np.array([np.sin(turn), np.cos(turn)]), "last_action": self.last_action}
+        obs = self.layout.flatten(parts, self.frames, self.tasks.index(self.task.name))
+        self.frames.appendleft(obs[:FRAME_SIZE])
+        return obs
 
     def info(self, fallen: bool) -> dict[str, Any]:
         return {

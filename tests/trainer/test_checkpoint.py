@@ -10,8 +10,10 @@ import torch
 import trainers
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
 from tests.trainer.stub_env import StubEnv
+from tests.trainer.test_clockless import rows
 from tests.trainer.test_policy import observations
-from trainers import MultiHeadPolicy
+from trainers import ClocklessPolicy, MultiHeadPolicy, PhaseEstimator
+from trainers.clockless import clockless_layout
 
 
 @pytest.fixture
@@ -22,6 +24,30 @@ def saved(policy, tmp_path):
     path = tmp_path / "deep" / "policy.zip"
     policy.save(path)
     return policy, path
+
+
+@pytest.fixture
+def clockless(student, tmp_path):
+    """A clockless policy whose estimator has learned a normalisation, and the file it was saved to."""
+    estimator = PhaseEstimator(clockless_layout(student, 3), width=16, seed=5)
+    rng = np.random.default_rng(1)
+    estimator.normalizer.set(rng.normal(size=estimator.layout.size), rng.uniform(0.5, 2, estimator.layout.size))
+    policy, path = ClocklessPolicy(student, estimator, 0.3), tmp_path / "clockless.zip"
+    policy.save(path)
+    return policy, path
+
+
+def rewrite(path, changes: dict[str, bytes | None], description: dict | None = None) -> None:
+    """Replace files of an archive, or leave them out, and entries of the description of its clockless part."""
+    with zipfile.ZipFile(path) as archive:
+        files = {name: archive.read(name) for name in archive.namelist()}
+    known = json.loads(files["policy.json"])
+    known["clockless"] |= description or {}
+    files |= {"policy.json": json.dumps(known).encode()} | changes
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in files.items():
+            if content is not None:
+                archive.writestr(name, content)
 
 
 @pytest.mark.parametrize("load", [trainers.load, MultiHeadPolicy.load])
@@ -116,3 +142,60 @@ def test_inconsistent_description(saved, tmp_path, change):
         archive.writestr("weights.safetensors", weights)
     with pytest.raises(trainers.CheckpointError):
         trainers.load(tmp_path / "p.zip")
+
+
+@pytest.mark.parametrize("load", [trainers.load, ClocklessPolicy.load])
+def test_clockless_round_trip_is_exact(clockless, load):
+    policy, path = clockless
+    other = load(path)
+    assert isinstance(other, ClocklessPolicy) and not other.training and not other.student.training
+    assert other.state_dict().keys() == policy.state_dict().keys()
+    assert all(torch.equal(a, b) for a, b in zip(other.state_dict().values(), policy.state_dict().values()))
+    assert (other.correction, other.env_kwargs) == (policy.correction, policy.env_kwargs)
+    assert other.observation_space == policy.observation_space and other.action_space == policy.action_space
+    state = other_state = None
+    for seed in range(3):
+        obs = rows([0, 3, 1, 2], seed=seed)
+        acts, state = policy.predict(obs, state, deterministic=True)
+        other_acts, other_state = other.predict(obs, other_state, deterministic=True)
+        np.testing.assert_array_equal(other_acts, acts)
+        np.testing.assert_array_equal(other_state[0], state[0])
+
+
+def test_a_clockless_file_is_json_and_safetensors_and_saves_to_the_same_bytes(clockless, tmp_path):
+    with zipfile.ZipFile(clockless[1]) as archive:
+        assert sorted(archive.namelist()) == ["phase.safetensors", "policy.json", "weights.safetensors"]
+        first = {name: archive.read(name) for name in archive.namelist()}
+    assert json.loads(first["policy.json"])["clockless"] == {"history": 3, "width": 16, "correction": 0.3}
+    trainers.load(clockless[1]).save(tmp_path / "again.zip")
+    with zipfile.ZipFile(tmp_path / "again.zip") as archive:
+        assert first == {name: archive.read(name) for name in archive.namelist()}
+
+
+def test_a_file_of_the_other_class_says_what_it_holds(clockless, saved):
+    with pytest.raises(trainers.CheckpointError, match="holds a ClocklessPolicy, a MultiHeadPolicy was expected"):
+        MultiHeadPolicy.load(clockless[1])
+    with pytest.raises(trainers.CheckpointError, match="holds a MultiHeadPolicy, a ClocklessPolicy was expected"):
+        ClocklessPolicy.load(saved[1])
+
+
+@pytest.mark.parametrize("name", ["phase.safetensors", "weights.safetensors"])
+def test_missing_and_damaged_weights(clockless, name):
+    path = clockless[1]
+    with zipfile.ZipFile(path) as archive:
+        whole = archive.read(name)
+    rewrite(path, {name: whole[: len(whole) // 2]})
+    with pytest.raises(trainers.CheckpointError, match="is damaged"):
+        trainers.load(path)
+    rewrite(path, {name: None})
+    with pytest.raises(trainers.CheckpointError, match=f"is damaged: .*{name}"):
+        trainers.load(path)
+
+
+@pytest.mark.parametrize(
+    "change", [{"width": 15}, {"history": 2}, {"history": 0}, {"correction": 2.0}, {"width": None}]
+)
+def test_inconsistent_description_of_a_clockless_policy(clockless, change):
+    rewrite(clockless[1], {}, change)
+    with pytest.raises(trainers.CheckpointError, match="does not hold a consistent policy"):
+        trainers.load(clockless[1])

@@ -10,8 +10,8 @@ import pytest
 
 from go1_mtl_gym import TASKS, DomainRandomization
 from go1_mtl_gym.errors import InvalidInputError
-from tests.trainer.stub_env import HIPS, THIGHS, StubEnv, make_stub
-from trainers import CollectJob, Demonstrations, PerturbationConfig, ShardMismatchError, collect, collect_all
+from tests.trainer.stub_env import HIPS, SIZE, THIGHS, StubEnv, make_stub
+from trainers import CollectJob, Demonstrations, PerturbationConfig, ShardMismatchError, collect, collect_all, watch
 from trainers.collection import CollectionError
 
 LAYOUT = {"q": slice(6, 18), "command": slice(34, 37), "phase": slice(37, 39), "last_action": slice(39, 51)}
@@ -87,6 +87,59 @@ def test_end_before_a_fall_is_dropped():
     lengths = [rows.stop - rows.start for rows in demos.episodes()]
     assert lengths == [39, 39, 22]  # 51 steps to the fall less 12
     assert demos.acts[:, 2].max() < 0.9
+
+
+class Driver:
+    """A policy of one frame that lifts legs as the clock says; it falls while the phase is beyond `falls_after`."""
+
+    def __init__(self, falls_after: float = 1.0, **env_kwargs) -> None:
+        self.falls_after, self.env_kwargs = falls_after, env_kwargs
+
+    def predict(self, obs, deterministic=False):
+        assert obs.shape == (SIZE + 4,) and deterministic
+        sine, cosine = obs[LAYOUT["phase"]]
+        action = np.zeros(12, dtype=np.float32)
+        action[1::3] = 0.5 * sine
+        action[2] = np.arctan2(-sine, -cosine) / (2 * np.pi) + 0.5 > self.falls_after
+        return action, None
+
+
+def test_watching_records_what_the_driver_saw_and_did_and_asks_no_expert():
+    made = []
+
+    def make(*args, **kwargs):
+        made.append(make_stub(*args, **kwargs))
+        return made[-1]
+
+    rows, layout = watch(Driver(control_hz=100), "trot", 5, 2.0, PerturbationConfig(), 3, make_env=make)
+    assert len(rows) == 200 and rows.control_hz == 100 and made[0].unwrapped.asked == 0
+    assert layout.history == 3 and rows.obs.shape[1] == layout.size == SIZE + 2 * 34 + 4
+    np.testing.assert_allclose(rows.acts[:, 1], 0.5 * rows.obs[:, layout.slices["phase"]][:, 0], atol=1e-7)
+    executed = rows.obs[1:, layout.slices["last_action"]]
+    assert 0.0 < np.abs(executed - rows.acts[:-1]).max() < 0.5, "the world adds its noise to what the driver wants"
+    older = rows.obs[:, layout.slices["history"]]
+    np.testing.assert_array_equal(older[2:], np.hstack([rows.obs[1:-1, :34], rows.obs[:-2, :34]]))
+
+
+def test_watching_is_a_pure_function_of_its_arguments():
+    one, same, other = (watch(Driver(), "jump", seed, 1.0, make_env=make_stub)[0].obs for seed in (7, 7, 8))
+    np.testing.assert_array_equal(one, same)
+    assert not np.array_equal(one, other)
+
+
+def test_a_driver_that_falls_is_watched_until_shortly_before():
+    rows, _ = watch(Driver(falls_after=0.93), "trot", 0, 1.0, make_env=make_stub)
+    lengths = [episode.stop - episode.start for episode in rows.episodes()]
+    assert set(lengths[:-1]) == {8} and sum(lengths) == 50  # 20 rows up to phase .95, less 12
+    with pytest.raises(CollectionError, match="keeps falling"):
+        watch(Driver(falls_after=0.5), "trot", 0, 1.0, make_env=make_stub)
+
+
+def test_watching_refuses_a_driver_of_several_frames_and_no_time():
+    with pytest.raises(InvalidInputError, match="one of 3"):
+        watch(Driver(history=3), "trot", make_env=make_stub)
+    with pytest.raises(InvalidInputError, match="seconds > 0"):
+        watch(Driver(), "trot", 0, 0.0, make_env=make_stub)
 
 
 def test_expert_that_always_falls():
