@@ -3,6 +3,7 @@
 python examples/report_student.py robustness --policy runs/students/seed-0/policy.zip    Ctrl-C and it goes on later
 python examples/report_student.py switching pushes --policy randomised=a.zip --policy nominal=b.zip     two students
 python examples/report_student.py robustness --quick --policy a.zip --out-dir runs/quick            a minute's worth
+python examples/report_student.py budget clockless                       students that are taught here, so no --policy
 
 Every section has its own file and figure, which hold what this command asked for and nothing else; whatever part was
 measured before is taken from --parts.
@@ -25,7 +26,7 @@ from student_lab import Walker, walkers
 from student_page import CHAPTERS
 from student_parts import SECTIONS, StudentPart, parts_of
 
-from go1_mtl_gym import Go1Error
+from go1_mtl_gym import PAPER_TASKS, Go1Error
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import number_in, one_of
 from trainers.checkpoint import versions
@@ -41,7 +42,7 @@ def plan(options: argparse.Namespace, who: Sequence[Walker]) -> dict[str, list[S
     Raises:
         InvalidInputError: if a gait is none of the students', `only` names no part, or there is nothing to measure.
     """
-    known = who[-1].env_kwargs["tasks"]
+    known = who[-1].env_kwargs["tasks"] if who else PAPER_TASKS
     tasks = [one_of(task, known, "task") for task in options.tasks or known]
     found = {}
     for name in options.sections:
@@ -57,18 +58,20 @@ def plan(options: argparse.Namespace, who: Sequence[Walker]) -> dict[str, list[S
     return kept
 
 
-def report(name: str, parts: Sequence[StudentPart], who: Sequence[Walker], options: argparse.Namespace) -> dict:
+def report(name: str, parts: Sequence[StudentPart], options: argparse.Namespace) -> dict:
     """Everything that was measured of a section, {walker: {gait: {part: figures}}}, and how to measure it again."""
+    section, who = parts[0].section, [part.walker for part in parts]
+    if section.prepare and not all(part.path.is_file() for part in parts):
+        section.prepare(section.config, parts[0].shared, options.n_jobs)
     found: dict[str, dict[str, dict[str, Any]]] = {}
     seconds = 0.0
     for part, result in zip(parts, measure_all(parts, options.n_jobs), strict=True):
         found.setdefault(part.walker.name, {}).setdefault(part.task, {})[part.what] = result["figures"]
         seconds += result["seconds"]
-    config = SECTIONS[name].quick if options.quick else SECTIONS[name].config
     return {
         "section": name,
         "report": found,
-        "config": {"settings": dataclasses.asdict(config), "env_kwargs": who[-1].env_kwargs},
+        "config": {"settings": dataclasses.asdict(section.config), "env_kwargs": who[-1].env_kwargs},
         "policies": {walker.name: walker.sha256 for walker in who if walker.sha256},
         "seed": options.seed,
         "versions": versions(),
@@ -88,7 +91,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     )
     add = parser.add_argument
     add("sections", nargs="+", choices=tuple(SECTIONS), help="what is measured")
-    add("--policy", action="append", required=True, help="the student's file, or name=file; once per student")
+    add("--policy", action="append", default=[], help="the student's file, or name=file; once per student")
     add("--tasks", nargs="+", default=None, help="gaits; None: all that the student knows")
     add("--only", nargs="+", default=None, help="quantities, directions or gaits changed to; None: all")
     add("--quick", action="store_true", help="few and short episodes, to see that everything works")
@@ -97,6 +100,11 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     add("--parts", type=Path, default=PARTS, help="folder of finished parts, from which an interrupted run goes on")
     add("--out-dir", type=Path, default=OUT, help="folder of the results and figures")
     options = parser.parse_args(arguments)
+    given = [name for name in options.sections if not SECTIONS[name].prepare]
+    if given and not options.policy:
+        raise InvalidInputError(f"{', '.join(given)} need --policy: the student that is measured; got none")
+    if options.tasks and len(given) < len(options.sections):
+        raise InvalidInputError("--tasks is not for sections that teach their own students: these learn every gait")
     number_in(options.seed, 0, 2**31 - 1, "seed")
     number_in(options.n_jobs, 1, 1024, "n_jobs")
     for names in (options.sections, options.tasks or [], options.only or []):
@@ -111,9 +119,9 @@ def main(arguments: list[str] | None = None) -> int:
     command = without_out(shlex.join(["python", "examples/report_student.py", *arguments]))
     try:
         options = parse(arguments)
-        who = walkers(options.policy)
+        who = walkers(options.policy) if options.policy else []
         for name, parts in plan(options, who).items():
-            data = report(name, parts, who, options) | {"command": command}
+            data = report(name, parts, options) | {"command": command}
             path = options.out_dir / f"student_{name}.json"
             write_json(path, data)
             picture = save_figure(FIGURES[name](data["report"]), path.with_suffix(".png"))

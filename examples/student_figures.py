@@ -8,6 +8,7 @@ from expert_figures import legend, new_figure, pair_matrix
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from student_lab import EXPERT
+from student_lessons_page import budget_figure, clockless_figure
 from student_pushes import PAIRS
 from student_robustness import QUANTITIES
 
@@ -107,5 +108,7 @@ FIGURES: dict[str, Callable[[Report], Figure]] = {
     "switching": switching_figure,
     "robustness": robustness_figure,
     "pushes": push_figure,
+    "budget": budget_figure,
+    "clockless": clockless_figure,
 }
 """Section -> what draws it."""

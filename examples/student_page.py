@@ -6,6 +6,7 @@ from typing import Any
 
 from student_figures import BAR, Report
 from student_lab import EXPERT
+from student_lessons_page import budget_table, clockless_table
 from student_robustness import QUANTITIES
 
 from trainers.report import markdown
@@ -126,6 +127,23 @@ CHAPTERS = {
         "cycle, walking at 0.3 m/s.",
         "Largest kick survived, of student and expert",
         push_table,
+    ),
+    "budget": Chapter(
+        "DAgger against cloning",
+        "Success, and in brackets survival, with equally many labels per gait; episodes of all gaits and training "
+        "seeds together. Error, falls (of all gaits) and the learner's share of the steps while collecting belong to "
+        "the last column of budgets. Success drops where it falls from one budget to the next by more than the 95 % "
+        "interval of the difference.",
+        "Survival, success and falls over labels, of five ways to ask for them",
+        budget_table,
+    ),
+    "clockless": Chapter(
+        "Without a clock",
+        "Successful episodes with commands that change, in every gait; survivors, changes of gait and noisy sensors "
+        "of all gaits together; median and 99th percentile of the error of the phase on disturbed walks of the expert "
+        "that nobody learned from. All but named students learned from the same demonstrations.",
+        "Success and error of the phase, of students without a clock",
+        clockless_table,
     ),
 }
 """Sections in the order of the page."""

@@ -6,7 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import student_budget
+import student_clockless
 from report_parts import digest, finished, sources
+from student_budget import BudgetConfig, budget
+from student_clockless import ClocklessConfig, clockless
 from student_lab import Walker
 from student_pushes import KickConfig, pushes
 from student_robustness import RobustnessConfig, robustness
@@ -31,18 +35,23 @@ class Section:
         config: its settings; ``config.parts(task, tasks)`` names the parts of a gait among the students' gaits.
         quick: settings of ``--quick``: everything is measured, nothing is measured well.
         alone: whether nothing else may run meanwhile, because it measures time.
+        prepare: of a section that teaches its own students: (config, folder, n_jobs) makes what its parts share in a
+            folder that `measure` is given too; then ``config.lessons(walkers)`` gives walker, gait and part of each.
     """
 
     measure: Callable[..., dict[str, Any]]
     config: Any
     quick: Any
     alone: bool = False
+    prepare: Callable[[Any, Path, int], None] | None = None
 
 
 SECTIONS = {
     "switching": Section(switching, SwitchingConfig(), SwitchingConfig(trials=1, before_s=0.5, after_s=3.0)),
     "robustness": Section(robustness, RobustnessConfig(), RobustnessConfig(1, 3.0, 1.5, every=2)),
     "pushes": Section(pushes, KickConfig(), KickConfig(2, grid=2, before_s=0.5, after_s=0.5)),
+    "budget": Section(budget, BudgetConfig(), student_budget.QUICK, prepare=student_budget.prepare),
+    "clockless": Section(clockless, ClocklessConfig(), student_clockless.QUICK, prepare=student_clockless.prepare),
 }
 """Every section by name."""
 
@@ -82,9 +91,17 @@ class StudentPart:
             repr((self.section.config, self.seed, versions())),
             *(inspect.getsource(inspect.getmodule(each)) for each in (self.section.measure, *SCORING)),
             sources(go1_mtl_gym),
+            self.shared.name if self.section.prepare else "",
         )
         who = own.sha256[:8] or own.name
-        return self.folder / f"{self.name}-{who}-{self.task}-{self.what}-{digest(words)}.json"
+        name = f"{self.name}-{who}-{self.task}-{self.what}-{digest(words)}.json"
+        return self.folder / name.replace(" ", "_")
+
+    @property
+    def shared(self) -> Path:
+        """Folder of demonstrations and students that the section's parts share; its name changes with the code."""
+        code = (sources(experts, go1_mtl_gym, trainers), inspect.getsource(inspect.getmodule(self.section.measure)))
+        return self.folder / f"{self.name}-{digest((repr(self.section.config), repr(versions()), *code))}"
 
     def measure(self) -> dict[str, Any]:
         """The finished part: read if it is there, else measured and written."""
@@ -92,7 +109,8 @@ class StudentPart:
 
     def _figures(self) -> dict[str, Any]:
         who, config = self.walker.load(), self.section.config
-        figures = self.section.measure(who, self.task, self.what, config, self.seed, **self.walker.env_kwargs)
+        more = {"folder": self.shared} if self.section.prepare else self.walker.env_kwargs
+        figures = self.section.measure(who, self.task, self.what, config, self.seed, **more)
         return {"section": self.name, "task": self.task, "what": self.what, "figures": figures}
 
 
@@ -100,9 +118,9 @@ def parts_of(
     name: str, section: Section, who: Sequence[Walker], tasks: Sequence[str], seed: int, folder: Path
 ) -> list[StudentPart]:
     """All parts of a section."""
-    return [
-        StudentPart(name, section, walker, task, what, seed, folder)
-        for walker in who
-        for task in tasks
-        for what in section.config.parts(task, tasks)
-    ]
+    config = section.config
+    if section.prepare:
+        found = config.lessons(who)
+    else:
+        found = [(walker, task, what) for walker in who for task in tasks for what in config.parts(task, tasks)]
+    return [StudentPart(name, section, *each, seed, folder) for each in found]
