@@ -2,8 +2,9 @@
 
 python examples/report_student.py robustness --policy runs/students/seed-0/policy.zip    Ctrl-C and it goes on later
 python examples/report_student.py switching pushes --policy randomised=a.zip --policy nominal=b.zip     two students
-python examples/report_student.py robustness --quick --policy a.zip --out-dir runs/quick            a minute's worth
 python examples/report_student.py budget clockless                       students that are taught here, so no --policy
+python examples/report_student.py clockless --policy clockless=c.zip     the same, and a finished one without a clock
+python examples/report_student.py robustness --quick --policy a.zip --out-dir runs/quick            a minute's worth
 
 Every section has its own file and figure, which hold what this command asked for and nothing else; whatever part was
 measured before is taken from --parts.
@@ -23,10 +24,11 @@ from publish_results import without_out
 from report_parts import measure_all
 from student_figures import FIGURES
 from student_lab import Walker, walkers
+from student_lessons import ALL
 from student_page import CHAPTERS
 from student_parts import SECTIONS, StudentPart, parts_of
 
-from go1_mtl_gym import PAPER_TASKS, Go1Error
+from go1_mtl_gym import Go1Error
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import number_in, one_of
 from trainers.checkpoint import versions
@@ -42,14 +44,15 @@ def plan(options: argparse.Namespace, who: Sequence[Walker]) -> dict[str, list[S
     Raises:
         InvalidInputError: if a gait is none of the students', `only` names no part, or there is nothing to measure.
     """
-    known = who[-1].env_kwargs["tasks"] if who else PAPER_TASKS
+    known = who[-1].env_kwargs["tasks"] if who else ()
     tasks = [one_of(task, known, "task") for task in options.tasks or known]
     found = {}
     for name in options.sections:
         section = SECTIONS[name]
         if options.quick:
             section = dataclasses.replace(section, config=section.quick)
-        found[name] = parts_of(name, section, who, tasks, options.seed, options.parts)
+        whom, gaits = (section.config.walkers(who), [ALL]) if section.prepare else (who, tasks)
+        found[name] = parts_of(name, section, whom, gaits, options.seed, options.parts)
     names = tuple(dict.fromkeys(part.what for parts in found.values() for part in parts))
     only = [one_of(name, names, "part") for name in options.only or names]
     kept = {name: [part for part in parts if part.what in only] for name, parts in found.items()}
@@ -100,11 +103,11 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     add("--parts", type=Path, default=PARTS, help="folder of finished parts, from which an interrupted run goes on")
     add("--out-dir", type=Path, default=OUT, help="folder of the results and figures")
     options = parser.parse_args(arguments)
-    given = [name for name in options.sections if not SECTIONS[name].prepare]
-    if given and not options.policy:
-        raise InvalidInputError(f"{', '.join(given)} need --policy: the student that is measured; got none")
-    if options.tasks and len(given) < len(options.sections):
-        raise InvalidInputError("--tasks is not for sections that teach their own students: these learn every gait")
+    measuring = [name for name in options.sections if not SECTIONS[name].prepare]
+    if measuring and not options.policy:
+        raise InvalidInputError(f"{', '.join(measuring)} measures given students: expected --policy, got none")
+    if options.tasks and len(measuring) < len(options.sections):
+        raise InvalidInputError(f"expected no --tasks where students are taught every gait, got {options.tasks}")
     number_in(options.seed, 0, 2**31 - 1, "seed")
     number_in(options.n_jobs, 1, 1024, "n_jobs")
     for names in (options.sections, options.tasks or [], options.only or []):

@@ -11,7 +11,7 @@ from typing import Any
 from dagger_config import JobConfig
 from dagger_students import new_policy
 from student_lab import Walker, summary
-from student_lessons import ALL, Pupil, kept_policy, pooled, rows_of, shard_jobs
+from student_lessons import Pupil, kept_policy, pooled, rows_of, shard_jobs
 
 import trainers
 from go1_mtl_gym.errors import InvalidInputError
@@ -74,9 +74,13 @@ class BudgetConfig:
                 f"budgets_s must be whole shards of {self.job.shard_s} s and each twice the last, got {self.budgets_s}"
             )
 
-    def lessons(self, _who: Sequence[Walker]) -> list[tuple[Walker, str, str]]:
-        """Walker, gait and name of every part: one per method and training seed."""
-        return [(Pupil(name), ALL, f"seed {seed}") for name in METHODS for seed in self.seeds]
+    def walkers(self, _given: Sequence[Walker]) -> list[Walker]:
+        """A student of every method."""
+        return [Pupil(name) for name in METHODS]
+
+    def parts(self, _task: str, _tasks: Sequence[str]) -> tuple[str, ...]:
+        """One part per training seed."""
+        return tuple(f"seed {seed}" for seed in self.seeds)
 
     def seeded(self, seed: int) -> JobConfig:
         """The job of one training seed."""

@@ -9,7 +9,7 @@ from typing import Any
 from dagger_config import JobConfig
 from dagger_students import new_policy
 from student_lab import Walker, summary
-from student_lessons import ALL, Pupil, kept_policy, pooled, rows_of, shard_jobs
+from student_lessons import Pupil, kept_policy, pooled, rows_of, shard_jobs
 from student_phase import (
     Estimate,
     ask_for_phase,
@@ -26,8 +26,8 @@ from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.observation import ObservationLayout, SensorNoise
 from trainers.clockless import clockless_layout
 
-TOLD = "correction {:g}"
-"""Name of the part of a finished student that corrects its clock so much; see `trainers.ClocklessPolicy`."""
+TAUGHT, CORRECTED = "taught here", "correction {:g}"
+"""Part of a variant, and part of a finished student that corrects its clock so much; see `trainers.ClocklessPolicy`."""
 
 
 @dataclass(frozen=True)
@@ -94,20 +94,25 @@ class ClocklessConfig:
                 f"expected the channels {CLOCKED} and {most} frames, got {self.job.channels} and {self.job.history}"
             )
 
-    def lessons(self, who: Sequence[Walker]) -> list[tuple[Walker, str, str]]:
-        """Walker, gait and name of every part: one per variant, and one per finished student and correction.
+    def walkers(self, given: Sequence[Walker]) -> list[Walker]:
+        """A student of every variant, and those finished students that are given.
 
         Raises:
             InvalidInputError: if a finished student is no `trainers.ClocklessPolicy`, or sees what is not recorded.
         """
-        given = [walker for walker in who if walker.path is not None]
-        for policy, walker in ((walker.load(), walker) for walker in given):
+        finished = [walker for walker in given if walker.path is not None]
+        for policy, walker in ((walker.load(), walker) for walker in finished):
             if not isinstance(policy, trainers.ClocklessPolicy):
                 kind = type(policy).__name__
                 raise InvalidInputError(f"expected a ClocklessPolicy, got a {kind}: {walker.path}")
             self.layout.columns(policy.estimator.layout)
-        more = [(walker, ALL, TOLD.format(correction)) for walker in given for correction in self.corrections]
-        return [*((Pupil(name), ALL, "taught here") for name in VARIANTS), *more]
+        corrected = tuple(CORRECTED.format(correction) for correction in self.corrections)
+        own = [Pupil(name, only=(TAUGHT,)) for name in VARIANTS]
+        return [*own, *(dataclasses.replace(walker, only=corrected) for walker in finished)]
+
+    def parts(self, _task: str, _tasks: Sequence[str]) -> tuple[str, ...]:
+        """One part for each of the variants, and one per correction for finished students."""
+        return (TAUGHT, *(CORRECTED.format(correction) for correction in self.corrections))
 
     @property
     def layout(self) -> ObservationLayout:

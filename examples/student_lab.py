@@ -29,12 +29,14 @@ class Walker:
         path: the student's file; None is the expert.
         sha256: of the file.
         env_kwargs: of the expert's environment; a student brings its own.
+        only: parts of a section that are measured of it; none: all.
     """
 
     name: str
     path: Path | None = None
     sha256: str = ""
     env_kwargs: dict[str, Any] = field(default_factory=dict)
+    only: tuple[str, ...] = ()
 
     def load(self) -> Any:
         """What `trainers.evaluate` takes: the policy, for an environment without its `WORLD`, or "expert"."""

@@ -91,6 +91,7 @@ def budget_figure(report: Report) -> Figure:
     shares.set_ylabel("survival (solid), success (dashed)")
     shares.set_ylim(-0.04, 1.04)
     falls.set_ylabel("falls while collecting, all gaits")
+    falls.set_ylim(bottom=0.0)
     legend(figure, [shares])
     return figure
 
@@ -123,7 +124,7 @@ def clockless_table(report: Report) -> str:
 
 
 def clockless_figure(report: Report) -> Figure:
-    """Success of every student while walking, with noisy sensors and in changes of gait, and the error of its phase."""
+    """Success while walking, with noisy sensors and in changes of gait; the phase error from median to 99 %."""
     named = clockless_rows(report)
     places = np.arange(len(named))[::-1]
     figure = new_figure(9.6, 1.2 + 0.4 * len(named))
@@ -141,7 +142,7 @@ def clockless_figure(report: Report) -> Figure:
             errors.plot(both, [place, place], color="0.35", linewidth=1.5, marker="|", markersize=9)
     errors.set_xscale("log")
     errors.set_xlim(PHASE_FLOOR, 0.6)
-    errors.set_xlabel("phase error, median to 99 % [cycles]")
+    errors.set_xlabel("phase error [cycles]")
     shares.set_xlim(-0.02, 1.02)
     shares.set_xlabel("success")
     shares.set_yticks(places, list(named))

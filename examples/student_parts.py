@@ -35,8 +35,8 @@ class Section:
         config: its settings; ``config.parts(task, tasks)`` names the parts of a gait among the students' gaits.
         quick: settings of ``--quick``: everything is measured, nothing is measured well.
         alone: whether nothing else may run meanwhile, because it measures time.
-        prepare: of a section that teaches its own students: (config, folder, n_jobs) makes what its parts share in a
-            folder that `measure` is given too; then ``config.lessons(walkers)`` gives walker, gait and part of each.
+        prepare: of a section whose parts teach the students that they measure, all gaits in one: (config, folder,
+            n_jobs) makes what they share in a folder that `measure` gets too. ``config.walkers(given)`` are measured.
     """
 
     measure: Callable[..., dict[str, Any]]
@@ -95,7 +95,7 @@ class StudentPart:
         )
         who = own.sha256[:8] or own.name
         name = f"{self.name}-{who}-{self.task}-{self.what}-{digest(words)}.json"
-        return self.folder / name.replace(" ", "_")
+        return self.folder / name.replace(",", "").replace(" ", "_")
 
     @property
     def shared(self) -> Path:
@@ -118,9 +118,10 @@ def parts_of(
     name: str, section: Section, who: Sequence[Walker], tasks: Sequence[str], seed: int, folder: Path
 ) -> list[StudentPart]:
     """All parts of a section."""
-    config = section.config
-    if section.prepare:
-        found = config.lessons(who)
-    else:
-        found = [(walker, task, what) for walker in who for task in tasks for what in config.parts(task, tasks)]
-    return [StudentPart(name, section, *each, seed, folder) for each in found]
+    return [
+        StudentPart(name, section, walker, task, what, seed, folder)
+        for walker in who
+        for task in tasks
+        for what in section.config.parts(task, tasks)
+        if what in (walker.only or (what,))
+    ]
