@@ -10,7 +10,6 @@ from typing import Any, TextIO
 
 import joblib
 import torch
-from dagger import Job
 from dagger_config import JobConfig
 from report_parts import digest
 from tqdm.auto import tqdm
@@ -31,12 +30,14 @@ class Student:
         policy: file of the student.
         clockless: file of the same without a clock; None if the settings ask for none.
         held_out: gait -> one-step errors on the held-out rows, as `trainers.offline_metrics` gives them.
+        seconds: that the lesson took [s].
     """
 
     folder: Path
     policy: Path
     clockless: Path | None
     held_out: dict[str, dict[str, float]]
+    seconds: float
 
 
 def teach(config: JobConfig, root: Path) -> Student:
@@ -55,14 +56,14 @@ def teach(config: JobConfig, root: Path) -> Student:
         InvalidInputError: if a setting cannot be.
     """
     folder = root / lesson_name(config)
-    done = folder / "held_out.json"
+    done = folder / "lesson.json"
     if not done.is_file():
         folder.mkdir(parents=True, exist_ok=True)
         with open(folder / "progress.log", "a", encoding="utf-8") as log, _alone(log):
             write_json(done, _lesson(config, folder))
     clockless = folder / "clockless.zip"
-    held_out = json.loads(done.read_text(encoding="utf-8"))
-    return Student(folder, folder / "policy.zip", clockless if clockless.is_file() else None, held_out)
+    found = json.loads(done.read_text(encoding="utf-8"))
+    return Student(folder, folder / "policy.zip", clockless if clockless.is_file() else None, **found)
 
 
 def teach_all(lessons: Mapping[str, JobConfig], root: Path, n_jobs: int) -> dict[str, Student]:
@@ -89,13 +90,15 @@ def lesson_name(config: JobConfig) -> str:
 
 
 def _lesson(config: JobConfig, folder: Path) -> dict[str, Any]:
-    """Make the students; returns the one-step errors of the first."""
+    """Make the students; returns the attributes of `Student` that are no files."""
+    from dagger import Job  # tries out OpenGL, for which nobody should wait who makes no student
+
     defaults = {each.name: each.default for each in dataclasses.fields(JobConfig) if each.name in UNUSED}
     job = Job(dataclasses.replace(config, **defaults | {"n_envs": 1}), folder)
     train, held_out = job.demonstrations()
     student = job.student(train, held_out)
     job.clockless(student)
-    return trainers.offline_metrics(student, held_out)
+    return {"held_out": trainers.offline_metrics(student, held_out), "seconds": round(sum(job.seconds.values()), 1)}
 
 
 @contextlib.contextmanager
