@@ -2,8 +2,8 @@
 
 python examples/report_student.py robustness --policy runs/students/seed-0/policy.zip    Ctrl-C and it goes on later
 python examples/report_student.py switching pushes --policy randomised=a.zip --policy nominal=b.zip     two students
-python examples/report_student.py commanded --seeds 0 1 2 3 4               makes its own five students, which takes hours
-python examples/report_student.py ablation                           makes its own, which differ in one setting each
+python examples/report_student.py commanded --seeds 0 1 2 3 4          makes its own five students, in some hours
+python examples/report_student.py ablation                     makes its own, which differ in one setting each, in one
 python examples/report_student.py robustness --quick --policy a.zip --out-dir runs/quick            a minute's worth
 
 Every section has its own file and figure, which hold what this command asked for and nothing else; whatever part was
@@ -94,12 +94,12 @@ def report(name: str, pairs: Sequence[tuple[str, str]], given: Sequence[Walker],
         students = teach_all(lessons, options.parts / "students", options.n_jobs)
         given = school.walkers(students)
         about = {"lessons": {own: changed(config) for own, config in lessons.items()}, "bars": school.bars}
-        seconds = {"students": round(sum(student.seconds for student in students.values()), 1)}
+        seconds = {"students": sum(student.seconds for student in students.values())}
     parts = parts_of(name, section, given, pairs, options.seed, options.parts)
     found: dict[str, dict[str, dict[str, Any]]] = {}
     for part, result in zip(parts, measure_all(parts, options.n_jobs), strict=True):
         found.setdefault(part.walker.name, {}).setdefault(part.task, {})[part.what] = result["figures"]
-        seconds[name] = round(seconds.get(name, 0.0) + result["seconds"], 1)
+        seconds[name] = seconds.get(name, 0.0) + result["seconds"]
     return {
         "section": name,
         "report": school.complete(found, students) if school else found,
@@ -107,7 +107,7 @@ def report(name: str, pairs: Sequence[tuple[str, str]], given: Sequence[Walker],
         "policies": {walker.name: walker.sha256 for walker in given if walker.sha256},
         "seed": options.seed,
         "versions": versions(),
-        "seconds": seconds,
+        "seconds": {what: round(value, 1) for what, value in seconds.items()},
         **about,
     }
 
