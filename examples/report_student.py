@@ -130,10 +130,16 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         help=f"the student's file, or name=file; once per student (not for {' and '.join(OWN)}: they make their own)",
     )
     add("--tasks", nargs="+", default=None, help="gaits; None: all that the student knows")
-    add("--only", nargs="+", default=None, help="quantities, directions or gaits changed to; None: all")
+    add("--only", nargs="+", default=None, help="parts, such as quantities, directions or gaits changed to; None: all")
     add("--quick", action="store_true", help="few and short episodes, to see that everything works")
     add("--seed", type=int, default=1, help="of commands, resets, noise and kicks")
-    add("--seeds", type=int, nargs="+", default=[0, 1, 2, 3, 4], help="of training; ablation takes the first")
+    add(
+        "--seeds",
+        type=int,
+        nargs="+",
+        default=[0, 1, 2, 3, 4],
+        help="of the training of their own students; ablation takes the first",
+    )
     add("--n-jobs", type=int, default=os.cpu_count() or 1, help="processes")
     add("--parts", type=Path, default=PARTS, help="folder of finished parts, from which an interrupted run goes on")
     add("--out-dir", type=Path, default=OUT, help="folder of the results and figures")
