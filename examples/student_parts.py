@@ -9,8 +9,11 @@ from typing import Any
 import student_budget
 import student_clockless
 from report_parts import digest, finished, sources
+from student_ablation import AblationConfig, ablation
 from student_budget import BudgetConfig, budget
+from student_classes import ABLATION, COMMANDED, SchoolClass
 from student_clockless import ClocklessConfig, clockless
+from student_commanded import CommandedConfig, commanded
 from student_lab import Walker
 from student_pushes import KickConfig, pushes
 from student_robustness import RobustnessConfig, robustness
@@ -35,6 +38,7 @@ class Section:
         config: its settings; ``config.parts(task, tasks)`` names the parts of a gait among the students' gaits.
         quick: settings of ``--quick``: everything is measured, nothing is measured well.
         alone: whether nothing else may run meanwhile, because it measures time.
+        school: of the students that the section makes itself; None: it measures those that it is given.
         prepare: of a section whose parts teach the students that they measure, all gaits in one: (config, folder,
             n_jobs) makes what they share in a folder that `measure` gets too. ``config.walkers(given)`` are measured.
     """
@@ -43,13 +47,16 @@ class Section:
     config: Any
     quick: Any
     alone: bool = False
+    school: SchoolClass | None = None
     prepare: Callable[[Any, Path, int], None] | None = None
 
 
 SECTIONS = {
+    "commanded": Section(commanded, CommandedConfig(), CommandedConfig(2, 1, 1, 4.0, 2.0), school=COMMANDED),
     "switching": Section(switching, SwitchingConfig(), SwitchingConfig(trials=1, before_s=0.5, after_s=3.0)),
     "robustness": Section(robustness, RobustnessConfig(), RobustnessConfig(1, 3.0, 1.5, every=2)),
     "pushes": Section(pushes, KickConfig(), KickConfig(2, grid=2, before_s=0.5, after_s=0.5)),
+    "ablation": Section(ablation, AblationConfig(), AblationConfig(2, 1, 4.0, 2.0, 1, 0.5, 3.0), school=ABLATION),
     "budget": Section(budget, BudgetConfig(), student_budget.QUICK, prepare=student_budget.prepare),
     "clockless": Section(clockless, ClocklessConfig(), student_clockless.QUICK, prepare=student_clockless.prepare),
 }
@@ -115,13 +122,12 @@ class StudentPart:
 
 
 def parts_of(
-    name: str, section: Section, who: Sequence[Walker], tasks: Sequence[str], seed: int, folder: Path
+    name: str, section: Section, who: Sequence[Walker], pairs: Sequence[tuple[str, str]], seed: int, folder: Path
 ) -> list[StudentPart]:
-    """All parts of a section."""
+    """All parts of a section: every walker, and those (gait, part) that it is measured in."""
     return [
         StudentPart(name, section, walker, task, what, seed, folder)
         for walker in who
-        for task in tasks
-        for what in section.config.parts(task, tasks)
+        for task, what in pairs
         if what in (walker.only or (what,))
     ]

@@ -154,7 +154,8 @@ def test_the_figure_shows_survival_success_and_falls():
 
 def test_parts_share_a_folder_that_changes_with_the_settings(tmp_path):
     section = student_parts.SECTIONS["budget"]
-    parts = student_parts.parts_of("budget", section, section.config.walkers([]), ["all gaits"], 1, tmp_path)
+    pairs = [("all gaits", what) for what in section.config.parts("all gaits", ())]
+    parts = student_parts.parts_of("budget", section, section.config.walkers([]), pairs, 1, tmp_path)
     assert len({part.path for part in parts}) == 10 and len({part.shared for part in parts}) == 1
     other = dataclasses.replace(parts[0], section=dataclasses.replace(section, config=section.quick))
     assert other.shared != parts[0].shared and other.path != parts[0].path
@@ -174,7 +175,9 @@ def test_a_quick_run_needs_no_policy_and_reads_what_is_there(tmp_path, capsys):
     assert kept == {path: path.stat().st_mtime_ns for path in (tmp_path / "parts").rglob("*") if path.is_file()}
 
 
-@pytest.mark.parametrize("arguments", ["pushes", "budget pushes", "budget --tasks trot", "budget --only walk"])
+@pytest.mark.parametrize(
+    "arguments", ["budget pushes", "budget --tasks trot", "budget --only walk", "budget --policy a.zip"]
+)
 def test_impossible_commands_are_refused(arguments, tmp_path, capsys):
     assert report_student.main([*arguments.split(), "--out-dir", str(tmp_path / "out")]) == 2
     assert "error: " in capsys.readouterr().err and not (tmp_path / "out").exists()

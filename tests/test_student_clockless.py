@@ -174,7 +174,8 @@ def test_finished_students_are_measured_with_each_correction_and_others_refused(
     new_policy(TINY.job, TINY.job.env_kwargs).save(tmp_path / "p.zip")
     section = dataclasses.replace(student_parts.SECTIONS["clockless"], config=TINY)
     who = section.config.walkers(student_lab.walkers([f"own={tmp_path / 'c.zip'}"]))
-    parts = student_parts.parts_of("clockless", section, who, ["all gaits"], 1, tmp_path)
+    pairs = [("all gaits", what) for what in section.config.parts("all gaits", ())]
+    parts = student_parts.parts_of("clockless", section, who, pairs, 1, tmp_path)
     assert [(part.walker.name, part.what) for part in parts[-3:]] == [
         ("clock", "taught here"),
         ("own", "correction 1"),
