@@ -4,7 +4,7 @@ python examples/report_student.py robustness --policy runs/students/seed-0/polic
 python examples/report_student.py switching pushes --policy randomised=a.zip --policy nominal=b.zip     two students
 python examples/report_student.py commanded --seeds 0 1 2 3 4          makes its own five students, in some hours
 python examples/report_student.py ablation                     makes its own, which differ in one setting each, in one
-python examples/report_student.py budget clockless               the same, with an hour or so for each; their own seeds
+python examples/report_student.py budget clockless           the same, in less than an hour each; with their own seeds
 python examples/report_student.py clockless --policy clockless=c.zip     and a finished one without a clock beside them
 python examples/report_student.py robustness --quick --policy a.zip --out-dir runs/quick            a minute's worth
 
