@@ -1,11 +1,15 @@
-"""The student's report: changes of gait, another world and kicks, each measured for the student and for the expert.
+"""The student's report, one file and one figure per section, for the student and for the expert.
 
 python examples/report_student.py robustness --policy runs/students/seed-0/policy.zip    Ctrl-C and it goes on later
 python examples/report_student.py switching pushes --policy randomised=a.zip --policy nominal=b.zip     two students
+python examples/report_student.py commanded --seeds 0 1 2 3 4          makes its own five students, in some hours
+python examples/report_student.py ablation                     makes its own, which differ in one setting each, in one
+python examples/report_student.py budget clockless           the same, in less than an hour each; with their own seeds
+python examples/report_student.py clockless --policy clockless=c.zip     and a finished one without a clock beside them
 python examples/report_student.py robustness --quick --policy a.zip --out-dir runs/quick            a minute's worth
 
 Every section has its own file and figure, which hold what this command asked for and nothing else; whatever part was
-measured before is taken from --parts.
+measured before, and whatever student was made, is taken from --parts.
 """
 
 import argparse
@@ -13,17 +17,20 @@ import dataclasses
 import os
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from expert_figures import save_figure
 from publish_results import without_out
 from report_parts import measure_all
+from student_classes import changed
 from student_figures import FIGURES
 from student_lab import Walker, walkers
+from student_lessons import ALL
 from student_page import CHAPTERS
-from student_parts import SECTIONS, StudentPart, parts_of
+from student_parts import SECTIONS, Section, parts_of
+from student_school import teach_all
 
 from go1_mtl_gym import Go1Error
 from go1_mtl_gym.errors import InvalidInputError
@@ -33,46 +40,86 @@ from trainers.files import write_json
 
 OUT = Path("docs/results")
 PARTS = Path("runs/student")
+OWN = tuple(name for name, section in SECTIONS.items() if section.school or section.prepare)
+"""Sections that make their own students."""
+BESIDE = ("clockless",)
+"""Those of them that measure given ones beside them, if there are any."""
 
 
-def plan(options: argparse.Namespace, who: Sequence[Walker]) -> dict[str, list[StudentPart]]:
-    """The parts of every section asked for.
+def section_of(name: str, quick: bool) -> Section:
+    """A section with the settings that are asked for."""
+    section = SECTIONS[name]
+    return dataclasses.replace(section, config=section.quick) if quick else section
+
+
+def gaits(name: str, given: Sequence[Walker], options: argparse.Namespace) -> Sequence[str]:
+    """What a section's students know, those that it makes or those that are given."""
+    school = SECTIONS[name].school
+    if SECTIONS[name].prepare:
+        return (ALL,)
+    if school is None:
+        return given[-1].env_kwargs["tasks"]
+    return next(iter(school.lessons(options.seeds, options.quick).values())).tasks
+
+
+def plan(options: argparse.Namespace, known: Mapping[str, Sequence[str]]) -> dict[str, list[tuple[str, str]]]:
+    """The gaits and parts of every section asked for.
+
+    Args:
+        options: of the command line.
+        known: section -> the gaits of its students.
 
     Raises:
         InvalidInputError: if a gait is none of the students', `only` names no part, or there is nothing to measure.
     """
-    known = who[-1].env_kwargs["tasks"]
-    tasks = [one_of(task, known, "task") for task in options.tasks or known]
     found = {}
     for name in options.sections:
-        section = SECTIONS[name]
-        if options.quick:
-            section = dataclasses.replace(section, config=section.quick)
-        found[name] = parts_of(name, section, who, tasks, options.seed, options.parts)
-    names = tuple(dict.fromkeys(part.what for parts in found.values() for part in parts))
+        tasks = [one_of(task, known[name], "task") for task in options.tasks or known[name]]
+        config = section_of(name, options.quick).config
+        found[name] = [(task, what) for task in tasks for what in config.parts(task, tasks)]
+    names = tuple(dict.fromkeys(what for pairs in found.values() for _, what in pairs))
     only = [one_of(name, names, "part") for name in options.only or names]
-    kept = {name: [part for part in parts if part.what in only] for name, parts in found.items()}
+    kept = {name: [pair for pair in pairs if pair[1] in only] for name, pairs in found.items()}
     if not all(kept.values()):
         raise InvalidInputError(f"these gaits and parts leave nothing to measure for {[*kept]}; expected some for each")
     return kept
 
 
-def report(name: str, parts: Sequence[StudentPart], who: Sequence[Walker], options: argparse.Namespace) -> dict:
-    """Everything that was measured of a section, {walker: {gait: {part: figures}}}, and how to measure it again."""
+def report(name: str, pairs: Sequence[tuple[str, str]], given: Sequence[Walker], options: argparse.Namespace) -> dict:
+    """Everything that was measured of a section, {walker: {gait: {part: figures}}}, and how to measure it again.
+
+    Args:
+        name: of the section.
+        pairs: gaits and parts.
+        given: who is measured, if the section does not make its own students.
+        options: of the command line.
+    """
+    section = section_of(name, options.quick)
+    school, about, seconds = section.school, {}, {}
+    if school:
+        lessons = school.lessons(options.seeds, options.quick)
+        students = teach_all(lessons, options.parts / "students", options.n_jobs)
+        given = school.walkers(students)
+        about = {"lessons": {own: changed(config) for own, config in lessons.items()}, "bars": school.bars}
+        seconds = {"students": sum(student.seconds for student in students.values())}
+    elif section.prepare:
+        given = section.config.walkers(given)
+    parts = parts_of(name, section, given, pairs, options.seed, options.parts)
+    if section.prepare and not all(part.path.is_file() for part in parts):
+        section.prepare(section.config, parts[0].shared, options.n_jobs)
     found: dict[str, dict[str, dict[str, Any]]] = {}
-    seconds = 0.0
     for part, result in zip(parts, measure_all(parts, options.n_jobs), strict=True):
         found.setdefault(part.walker.name, {}).setdefault(part.task, {})[part.what] = result["figures"]
-        seconds += result["seconds"]
-    config = SECTIONS[name].quick if options.quick else SECTIONS[name].config
+        seconds[name] = seconds.get(name, 0.0) + result["seconds"]
     return {
         "section": name,
-        "report": found,
-        "config": {"settings": dataclasses.asdict(config), "env_kwargs": who[-1].env_kwargs},
-        "policies": {walker.name: walker.sha256 for walker in who if walker.sha256},
+        "report": school.complete(found, students) if school else found,
+        "config": {"settings": dataclasses.asdict(section.config), "env_kwargs": given[-1].env_kwargs},
+        "policies": {walker.name: walker.sha256 for walker in given if walker.sha256},
         "seed": options.seed,
         "versions": versions(),
-        "seconds": {name: round(seconds, 1)},
+        "seconds": {what: round(value, 1) for what, value in seconds.items()},
+        **about,
     }
 
 
@@ -88,20 +135,39 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     )
     add = parser.add_argument
     add("sections", nargs="+", choices=tuple(SECTIONS), help="what is measured")
-    add("--policy", action="append", required=True, help="the student's file, or name=file; once per student")
+    add(
+        "--policy",
+        action="append",
+        help=f"the student's file, or name=file; once per student ({', '.join(OWN)} make their own, and only "
+        f"{', '.join(BESIDE)} can measure others beside them)",
+    )
     add("--tasks", nargs="+", default=None, help="gaits; None: all that the student knows")
-    add("--only", nargs="+", default=None, help="quantities, directions or gaits changed to; None: all")
+    add("--only", nargs="+", default=None, help="parts, such as quantities, directions or gaits changed to; None: all")
     add("--quick", action="store_true", help="few and short episodes, to see that everything works")
     add("--seed", type=int, default=1, help="of commands, resets, noise and kicks")
+    add(
+        "--seeds",
+        type=int,
+        nargs="+",
+        default=[0, 1, 2, 3, 4],
+        help="of the training of commanded's own students; ablation takes the first, others have theirs",
+    )
     add("--n-jobs", type=int, default=os.cpu_count() or 1, help="processes")
     add("--parts", type=Path, default=PARTS, help="folder of finished parts, from which an interrupted run goes on")
     add("--out-dir", type=Path, default=OUT, help="folder of the results and figures")
     options = parser.parse_args(arguments)
     number_in(options.seed, 0, 2**31 - 1, "seed")
     number_in(options.n_jobs, 1, 1024, "n_jobs")
-    for names in (options.sections, options.tasks or [], options.only or []):
+    for seed in options.seeds:
+        number_in(seed, 0, 2**31 - 1, "training seed")
+    for names in (options.sections, options.tasks or [], options.only or [], options.seeds):
         if len(set(names)) != len(names):
-            raise InvalidInputError(f"a section, gait or part was named twice: {' '.join(names)}")
+            raise InvalidInputError(f"a section, gait, part or seed was named twice: {' '.join(map(str, names))}")
+    needy = [name for name in options.sections if name not in OWN]
+    unused = not needy and not set(BESIDE) & set(options.sections)
+    if (needy and not options.policy) or (unused and options.policy):
+        expected = f"expected for {', '.join(needy)}" if needy else f"not for {', '.join(OWN)}, which make their own"
+        raise InvalidInputError(f"--policy is {expected}, got {options.policy}")
     return options
 
 
@@ -111,9 +177,9 @@ def main(arguments: list[str] | None = None) -> int:
     command = without_out(shlex.join(["python", "examples/report_student.py", *arguments]))
     try:
         options = parse(arguments)
-        who = walkers(options.policy)
-        for name, parts in plan(options, who).items():
-            data = report(name, parts, who, options) | {"command": command}
+        given = walkers(options.policy) if options.policy else []
+        for name, pairs in plan(options, {name: gaits(name, given, options) for name in options.sections}).items():
+            data = report(name, pairs, given, options) | {"command": command}
             path = options.out_dir / f"student_{name}.json"
             write_json(path, data)
             picture = save_figure(FIGURES[name](data["report"]), path.with_suffix(".png"))

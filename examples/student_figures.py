@@ -7,13 +7,16 @@ import numpy as np
 from expert_figures import legend, new_figure, pair_matrix
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from student_classes import BARS
+from student_commanded import DRAWN
 from student_lab import EXPERT
+from student_lessons_page import budget_figure, clockless_figure
 from student_pushes import PAIRS
 from student_robustness import QUANTITIES
+from student_sums import Count, Report, commanded_sums, gaits_of, seeds_of, variant_sums
 
 from trainers.metrics import wilson_interval
 
-Report = Mapping[str, Mapping[str, Mapping[str, Any]]]
 COLOURS = ("#2166ac", "#1b9e77", "#7570b3", "#e6ab02")
 """Of the students, in turn."""
 EXPERT_STYLE = {"color": "0.35", "linestyle": "--"}
@@ -25,6 +28,72 @@ def styles(report: Report) -> Iterator[tuple[str, dict[str, Any]]]:
     """Every walker and the style of its lines: students solid, the expert dashed."""
     for i, name in enumerate(report):
         yield name, EXPERT_STYLE if name == EXPERT else {"color": COLOURS[i % len(COLOURS)], "linestyle": "-"}
+
+
+def commanded_figure(report: Report) -> Figure:
+    """Per gait: the success of every training seed with that of all together, and velocity errors by the expert's."""
+    gaits = gaits_of(report)
+    figure = new_figure(9.0, 3.2)
+    left, right = figure.subplots(1, 2)
+    for i, gait in enumerate(gaits):
+        sums, seeds = commanded_sums(report, gait), seeds_of(report, gait, DRAWN).values()
+        places = i - 0.15 + np.linspace(-0.1, 0.1, len(seeds))
+        left.plot(places, [own["success_rate"] for own in seeds], "o", color=COLOURS[0], alpha=0.6, label="each seed")
+        _interval(left, i + 0.15, sums[DRAWN], label="all, 95 %")
+        errors = [np.nan if own["velocity_error"] is None else own["velocity_error"] for own in seeds]
+        right.plot(places, errors, "o", color=COLOURS[0], alpha=0.6)
+        if sums["expert_error"] is not None:
+            right.plot(i + 0.15, sums["expert_error"], "D", color=EXPERT_STYLE["color"], label=EXPERT)
+    for ax, key, label in ((left, "success_rate", "success"), (right, "velocity_error", "velocity error [m/s]")):
+        ax.axhline(BARS[key], color="0.7", linewidth=0.8, linestyle=":", zorder=0)
+        ax.set_xticks(range(len(gaits)), gaits)
+        ax.set_ylabel(label)
+    left.set_ylim(-0.04, 1.04)
+    right.set_ylim(bottom=0.0)
+    legend(figure, (left, right))
+    return figure
+
+
+def _interval(ax: Axes, x: float, count: Count, label: str) -> None:
+    succeeded, trials = count
+    if trials:
+        low, high = wilson_interval(succeeded, trials)
+        rate = succeeded / trials
+        span = [[max(0.0, rate - low)], [max(0.0, high - rate)]]
+        ax.errorbar(x, rate, span, color="black", marker="s", markersize=4, capsize=3, label=label)
+
+
+def ablation_figure(report: Report) -> Figure:
+    """A dot per variant and figure; the dotted lines are the first variant's, which the others change in one thing."""
+    columns = {
+        "success": "success",
+        "error": "velocity error [m/s]",
+        "switching": "changes of gait",
+        "changed": "changed world",
+        "r2": "one-step R2",
+    }
+    sums = {name: variant_sums(tasks) for name, tasks in report.items()}
+    figure = new_figure(2.1 * len(columns) + 1.8, 0.24 * len(sums) + 1.0)
+    axes = figure.subplots(1, len(columns), sharey=True)
+    for ax, (key, label) in zip(axes, columns.items()):
+        values = [_share(own[key]) for own in sums.values()]
+        ax.plot(values, range(len(values)), "o", color=COLOURS[0])
+        ax.axvline(values[0], color="0.6", linewidth=0.8, linestyle=":", zorder=0)
+        ax.set_xlabel(label, fontsize=9)
+        ax.tick_params(labelsize=8)
+        ax.grid(axis="y", color="0.93")
+        if key not in ("error", "r2"):
+            ax.set_xlim(-0.04, 1.04)
+    axes[0].set_yticks(range(len(sums)), sums)
+    axes[0].invert_yaxis()
+    return figure
+
+
+def _share(value: Count | float | None) -> float:
+    """A count as a share; NaN for nothing."""
+    if isinstance(value, tuple):
+        value = value[0] / value[1] if value[1] else None
+    return np.nan if value is None else value
 
 
 def switching_figure(report: Report) -> Figure:
@@ -104,8 +173,12 @@ def weaker(parts: Mapping[str, Any], pair: tuple[str, str]) -> float | None:
 
 
 FIGURES: dict[str, Callable[[Report], Figure]] = {
+    "commanded": commanded_figure,
     "switching": switching_figure,
     "robustness": robustness_figure,
     "pushes": push_figure,
+    "ablation": ablation_figure,
+    "budget": budget_figure,
+    "clockless": clockless_figure,
 }
 """Section -> what draws it."""

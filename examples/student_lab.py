@@ -29,12 +29,19 @@ class Walker:
         path: the student's file; None is the expert.
         sha256: of the file.
         env_kwargs: of the expert's environment; a student brings its own.
+        only: parts of a section that are measured of it; none: all.
     """
 
     name: str
     path: Path | None = None
     sha256: str = ""
     env_kwargs: dict[str, Any] = field(default_factory=dict)
+    only: tuple[str, ...] = ()
+
+    @classmethod
+    def student(cls, name: str, path: str | Path, only: tuple[str, ...] = ()) -> "Walker":
+        """The student in a file."""
+        return cls(name, Path(path), hashlib.sha256(Path(path).read_bytes()).hexdigest(), only=only)
 
     def load(self) -> Any:
         """What `trainers.evaluate` takes: the policy, for an environment without its `WORLD`, or "expert"."""
@@ -62,7 +69,7 @@ def walkers(policies: Sequence[str]) -> list[Walker]:
             raise InvalidInputError(f"expected another name than {EXPERT!r} for every policy, got {list(policies)}")
         kwargs = {"tasks": tuple(TASKS)} | trainers.load(path).env_kwargs
         shared.append({key: kwargs[key] for key in SHARED if key in kwargs})
-        found.append(Walker(name, Path(path), hashlib.sha256(Path(path).read_bytes()).hexdigest()))
+        found.append(Walker.student(name, path))
     if any(own != shared[0] for own in shared):
         raise InvalidInputError(f"expected students for the same {', '.join(SHARED)}, got {shared}")
     return [*found, Walker(EXPERT, env_kwargs=shared[0])]

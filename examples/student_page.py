@@ -4,10 +4,16 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from student_figures import BAR, Report
+from student_ablation import CHANGED_WORLD
+from student_classes import BARS, passes
+from student_commanded import CLOCKLESS, CORNERS, DRAWN
+from student_figures import BAR
 from student_lab import EXPERT
+from student_lessons_page import budget_table, clockless_table
 from student_robustness import QUANTITIES
+from student_sums import Count, Report, commanded_sums, gaits_of, variant_sums
 
+from trainers.metrics import wilson_interval
 from trainers.report import markdown
 
 
@@ -45,9 +51,39 @@ def student_section(name: str, data: Mapping[str, Any], made_by: str, picture: b
 # -- Tables ------------------------------------------------------------------------------------------------------------
 
 
+def commanded_table(report: Report) -> str:
+    """Per gait, over the training seeds: success, velocity error beside the expert's, corners, and without a clock."""
+    rows = []
+    for gait in gaits_of(report):
+        own = commanded_sums(report, gait)
+        tracked = [_number(own["expert_error"], ".3f"), "-"]
+        success = ["-"] * 5
+        if own[DRAWN][1]:
+            low, high = wilson_interval(*own[DRAWN])
+            errors = [_judged(own[key], "velocity_error", ".3f") for key in ("error", "worst_error")]
+            worst = _judged(own["worst"], "success_rate", ".0%")
+            success = [_count(own[DRAWN], BARS["success_rate"]), f"{low:.1%} ... {high:.1%}", worst, *errors]
+            tracked[1] = _judged(own["worst_ratio"], "error_ratio", ".2f")
+        rows.append([gait, *success, *tracked, *(_count(own[what]) for what in (CORNERS, "expert_corners", CLOCKLESS))])
+    header = ["gait", "success", "95 % interval", "worst seed", "velocity error [m/s]", "worst seed's", "expert's"]
+    return markdown([*header, "worst ratio", "corners", "expert's", "without a clock"], rows)
+
+
+def ablation_table(report: Report) -> str:
+    """Per variant: success in every gait, velocity error, changes of gait, the changed world, and one-step R2."""
+    gaits, rows = gaits_of(report), []
+    for name, tasks in report.items():
+        own = variant_sums(tasks)
+        counts = [own["gaits"].get(gait, (0, 0)) for gait in gaits]
+        numbers = [_number(own["error"], ".3f"), *(_count(own[what]) for what in ("switching", "changed"))]
+        rows.append([name, *map(_count, counts), *numbers, _number(own["r2"], ".4f")])
+    header = ["", *gaits, "velocity error [m/s]", "changes of gait", "changed world", "R2"]
+    return markdown(header, rows)
+
+
 def switching_table(report: Report) -> str:
     """Per walker and first gait: successes to each second gait, and survivals of all together."""
-    gaits = _gaits(report)
+    gaits = gaits_of(report)
     rows = []
     for name, tasks in report.items():
         for first, pairs in tasks.items():
@@ -59,7 +95,7 @@ def switching_table(report: Report) -> str:
 
 def robustness_table(report: Report) -> str:
     """Per student and quantity, in the middle of its range: survived and successful episodes of every gait."""
-    gaits, rows = _gaits(report), []
+    gaits, rows = gaits_of(report), []
     for name, tasks in report.items():
         for quantity in QUANTITIES if name != EXPERT else ():
             middle = {task: _middle(parts[quantity]["levels"]) for task, parts in tasks.items() if quantity in parts}
@@ -74,7 +110,7 @@ def push_table(report: Report) -> str:
     """Per gait and walker: largest kick in every direction [m/s]."""
     names = ("left", "right", "forward", "backward")
     rows = []
-    for gait in _gaits(report):
+    for gait in gaits_of(report):
         for name, tasks in report.items():
             parts = tasks.get(gait, {})
             rows.append([gait, name, *(_kick(parts[part]) if part in parts else "-" for part in names)])
@@ -84,8 +120,22 @@ def push_table(report: Report) -> str:
 # -- Cells -------------------------------------------------------------------------------------------------------------
 
 
-def _gaits(report: Report) -> list[str]:
-    return list(dict.fromkeys(gait for tasks in report.values() for gait in tasks))
+def _count(count: Count, bar: float = 0.0) -> str:
+    """Successes of trials; bold where their share is below a bar."""
+    succeeded, trials = count
+    if not trials:
+        return "-"
+    return f"{succeeded}/{trials}" if succeeded >= bar * trials - 1e-9 else f"**{succeeded}/{trials}**"
+
+
+def _judged(value: float | None, figure: str, how: str) -> str:
+    """A number; bold where it misses its bar, as one does that there is none of."""
+    text = _number(value, how)
+    return text if passes(figure, value) else f"**{text}**"
+
+
+def _number(value: float | None, how: str) -> str:
+    return "-" if value is None else format(value, how)
 
 
 def _middle(levels: list[dict[str, Any]]) -> dict[str, Any]:
@@ -94,11 +144,7 @@ def _middle(levels: list[dict[str, Any]]) -> dict[str, Any]:
 
 def _against_bar(level: Mapping[str, Any]) -> str:
     """Survived and successful episodes; bold where their share is below `BAR`."""
-    cells = []
-    for key in ("survived", "succeeded"):
-        text = f"{level[key]}/{level['trials']}"
-        cells.append(text if level[key] >= BAR * level["trials"] - 1e-9 else f"**{text}**")
-    return ", ".join(cells)
+    return ", ".join(_count((level[key], level["trials"]), BAR) for key in ("survived", "succeeded"))
 
 
 def _kick(found: Mapping[str, Any]) -> str:
@@ -106,6 +152,16 @@ def _kick(found: Mapping[str, Any]) -> str:
 
 
 CHAPTERS = {
+    "commanded": Chapter(
+        "Commands that change, over training seeds",
+        "Successful episodes with a new command every few seconds, of the main job's students for several training "
+        "seeds together, then of the worst seed; mean velocity error, that of the worst seed, the expert's, and the "
+        "largest ratio of a seed's to it; the same with commands from the corners of the ranges; and of the students "
+        f"without a clock. Bold misses a bar: success {BARS['success_rate']:.0%}, velocity error "
+        f"{BARS['velocity_error']:g} m/s, {BARS['error_ratio']:g} times the expert's.",
+        "Success per gait and training seed, and velocity errors beside the expert's",
+        commanded_table,
+    ),
     "switching": Chapter(
         "Changes of gait",
         "Successful changes while walking at a drawn command: no fall, and the second gait's commands and steps are "
@@ -126,6 +182,33 @@ CHAPTERS = {
         "cycle, walking at 0.3 m/s.",
         "Largest kick survived, of student and expert",
         push_table,
+    ),
+    "ablation": Chapter(
+        "One change each",
+        "Students of a reduced main job that differ in one setting: successful episodes with drawn commands per gait, "
+        "mean velocity error, successful changes of gait of all pairs, successful episodes in a changed world "
+        f"({', '.join(f'{name} {value:g}' for name, value in CHANGED_WORLD.items())}), and one-step R2 on held-out "
+        "rows of each one's own demonstrations. One training seed: differences of a few episodes say nothing.",
+        "Success, velocity error, changes of gait and changed world per variant",
+        ablation_table,
+    ),
+    "budget": Chapter(
+        "DAgger against cloning",
+        "Success, and in brackets survival, with equally many labels per gait; episodes of all gaits and training "
+        "seeds together. Error, falls (of all gaits) and the learner's share of the steps while collecting belong to "
+        "the last column of budgets. Success drops where it falls from one budget to the next by more than the 95 % "
+        "interval of the difference.",
+        "Survival, success and falls over labels, of five ways to ask for them",
+        budget_table,
+    ),
+    "clockless": Chapter(
+        "Without a clock",
+        "Successful episodes with commands that change, in every gait; survivors, changes of gait and noisy sensors "
+        "of all gaits together; median and 99th percentile of the error of the phase on disturbed walks of the expert "
+        "that nobody learned from. Students with a correction in their name were given; the others learned from the "
+        "same demonstrations.",
+        "Success and error of the phase, of students without a clock",
+        clockless_table,
     ),
 }
 """Sections in the order of the page."""

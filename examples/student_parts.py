@@ -6,7 +6,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import student_budget
+import student_clockless
 from report_parts import digest, finished, sources
+from student_ablation import AblationConfig, ablation
+from student_budget import BudgetConfig, budget
+from student_classes import ABLATION, COMMANDED, SchoolClass
+from student_clockless import ClocklessConfig, clockless
+from student_commanded import CommandedConfig, commanded
 from student_lab import Walker
 from student_pushes import KickConfig, pushes
 from student_robustness import RobustnessConfig, robustness
@@ -31,18 +38,27 @@ class Section:
         config: its settings; ``config.parts(task, tasks)`` names the parts of a gait among the students' gaits.
         quick: settings of ``--quick``: everything is measured, nothing is measured well.
         alone: whether nothing else may run meanwhile, because it measures time.
+        school: of the students that the section makes itself; None: it measures those that it is given.
+        prepare: of a section whose parts teach the students that they measure, all gaits in one: (config, folder,
+            n_jobs) makes what they share in a folder that `measure` gets too. ``config.walkers(given)`` are measured.
     """
 
     measure: Callable[..., dict[str, Any]]
     config: Any
     quick: Any
     alone: bool = False
+    school: SchoolClass | None = None
+    prepare: Callable[[Any, Path, int], None] | None = None
 
 
 SECTIONS = {
+    "commanded": Section(commanded, CommandedConfig(), CommandedConfig(2, 1, 1, 4.0, 2.0), school=COMMANDED),
     "switching": Section(switching, SwitchingConfig(), SwitchingConfig(trials=1, before_s=0.5, after_s=3.0)),
     "robustness": Section(robustness, RobustnessConfig(), RobustnessConfig(1, 3.0, 1.5, every=2)),
     "pushes": Section(pushes, KickConfig(), KickConfig(2, grid=2, before_s=0.5, after_s=0.5)),
+    "ablation": Section(ablation, AblationConfig(), AblationConfig(2, 1, 4.0, 2.0, 1, 0.5, 3.0), school=ABLATION),
+    "budget": Section(budget, BudgetConfig(), student_budget.QUICK, prepare=student_budget.prepare),
+    "clockless": Section(clockless, ClocklessConfig(), student_clockless.QUICK, prepare=student_clockless.prepare),
 }
 """Every section by name."""
 
@@ -82,9 +98,17 @@ class StudentPart:
             repr((self.section.config, self.seed, versions())),
             *(inspect.getsource(inspect.getmodule(each)) for each in (self.section.measure, *SCORING)),
             sources(go1_mtl_gym),
+            self.shared.name if self.section.prepare else "",
         )
         who = own.sha256[:8] or own.name
-        return self.folder / f"{self.name}-{who}-{self.task}-{self.what}-{digest(words)}.json"
+        name = f"{self.name}-{who}-{self.task}-{self.what}-{digest(words)}.json"
+        return self.folder / name.replace(",", "").replace(" ", "_")
+
+    @property
+    def shared(self) -> Path:
+        """Folder of demonstrations and students that the section's parts share; its name changes with the code."""
+        code = (sources(experts, go1_mtl_gym, trainers), inspect.getsource(inspect.getmodule(self.section.measure)))
+        return self.folder / f"{self.name}-{digest((repr(self.section.config), repr(versions()), *code))}"
 
     def measure(self) -> dict[str, Any]:
         """The finished part: read if it is there, else measured and written."""
@@ -92,17 +116,18 @@ class StudentPart:
 
     def _figures(self) -> dict[str, Any]:
         who, config = self.walker.load(), self.section.config
-        figures = self.section.measure(who, self.task, self.what, config, self.seed, **self.walker.env_kwargs)
+        more = {"folder": self.shared} if self.section.prepare else self.walker.env_kwargs
+        figures = self.section.measure(who, self.task, self.what, config, self.seed, **more)
         return {"section": self.name, "task": self.task, "what": self.what, "figures": figures}
 
 
 def parts_of(
-    name: str, section: Section, who: Sequence[Walker], tasks: Sequence[str], seed: int, folder: Path
+    name: str, section: Section, who: Sequence[Walker], pairs: Sequence[tuple[str, str]], seed: int, folder: Path
 ) -> list[StudentPart]:
-    """All parts of a section."""
+    """All parts of a section: every walker, and those (gait, part) that it is measured in."""
     return [
         StudentPart(name, section, walker, task, what, seed, folder)
         for walker in who
-        for task in tasks
-        for what in section.config.parts(task, tasks)
+        for task, what in pairs
+        if what in (walker.only or (what,))
     ]

@@ -161,8 +161,8 @@ class DAggerTrainer(imitation_dagger.DAggerTrainer):
         if rows is None:
             collector = self.create_trajectory_collector(seconds)
             self._drive(collector)
-            counts = {"falls": collector.falls, "takeovers": collector.takeovers}
-            for name, value in ({"learner_share": collector.learner_share} | counts).items():
+            counts = {name: getattr(collector, name) for name in ("learner_share", "falls", "takeovers")}
+            for name, value in counts.items():
                 self.logger.record(f"dagger/{name}", value)
             rows = dataclasses.replace(self.base, **collector.recorded(), meta=meta | counts)
             rows.save(path)

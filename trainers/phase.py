@@ -136,8 +136,7 @@ def phase_errors(
         InvalidInputError: if the layouts do not fit, or there are no rows.
     """
     seen, target = _inputs_and_phase(estimator, rows, layout)
-    (sin, cos), (true_sin, true_cos) = estimator.estimate(seen).T, target.T
-    error = np.abs(np.arctan2(sin * true_cos - cos * true_sin, cos * true_cos + sin * true_sin)) / (2 * np.pi)
+    error = phase_distance(estimator.estimate(seen), target)
     task = rows.task
     return {
         name: {"median": float(np.median(error[task == k])), "p99": float(np.quantile(error[task == k], 0.99))}
@@ -152,6 +151,17 @@ def _inputs_and_phase(
     if "phase" not in layout.channels or not len(rows):
         raise InvalidInputError(f"expected rows with the phase, got {len(rows)} with the channels {layout.channels}")
     return rows.select(layout, estimator.layout).obs, rows.obs[:, layout.slices["phase"]]
+
+
+def phase_distance(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Absolute difference of phases [cycles], at most 0.5, shape (n,).
+
+    Args:
+        first, second: (sine, cosine) of each, shape (n, 2).
+    """
+    (sin, cos), (other_sin, other_cos) = first.T, second.T
+    turn = np.arctan2(sin * other_cos - cos * other_sin, cos * other_cos + sin * other_sin)
+    return np.abs(turn) / (2 * np.pi)
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:
