@@ -50,7 +50,7 @@ class MPCConfig:
     input_weight: float = 0.4
     friction: float = 0.5
     max_force: float = 160.0
-    min_force: float = 20.0
+    min_force: float = 15.0
     solver: str = "osqp"
     tolerance: float = 6e-4
     rho: float = 1.4

@@ -15,8 +15,8 @@ as `experts.footholds` and `experts.swing` plan it. Height, sway, attitude and a
 those of `experts.nominal` about the commanded motion, and a foot touches the ground in stance and in the swing's end,
 where its arc is below the ground. `fit_phase` compares a state with the cycle at a grid of phases. It never looks at
 `RobotState.phase`, and the answer does not depend on where the robot is or which way it faces. A robot that stands on
-all feet at rest has no phase: where a gait has such moments (a trot or walk on the spot) the answer there may be half a
-cycle off.
+all feet at rest has no phase: where a gait has such moments (a trot or walk on the spot, a slow walk) the answer there
+may be up to half a cycle off.
 """
 
 from dataclasses import dataclass

@@ -65,7 +65,7 @@ def test_the_program_is_the_one_in_the_docstring(driven):
     low, high = program.l[N * NX :].reshape(N, 4, 5), program.u[N * NX :].reshape(N, 4, 5)
     assert (low[..., :4] == 0).all() and np.isinf(high[..., :4]).all()
     np.testing.assert_allclose(high[..., 4] * FORCE_UNIT, 160 * contact)
-    np.testing.assert_allclose(low[..., 4] * FORCE_UNIT, np.where(contact > 1 - 1e-9, 10.0, 0.0))
+    np.testing.assert_allclose(low[..., 4] * FORCE_UNIT, np.where(contact > 1 - 1e-9, 15.0, 0.0))
 
 
 def test_solutions_obey_dynamics_friction_and_schedule(mpc, driven):
