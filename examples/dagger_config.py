@@ -51,7 +51,7 @@ class JobConfig:
 
     preset: str = "default"
     tasks: tuple[str, ...] = PAPER_TASKS
-    rounds: int = 2
+    rounds: int = 3
     seed: int = 0
     n_envs: int = os.cpu_count() or 1
     device: str = "cpu"
@@ -61,9 +61,9 @@ class JobConfig:
     kp: float = 50.0
     kd: float = 2.0
     clean_s: float = 60.0
-    perturbed_s: float = 240.0
+    perturbed_s: float = 300.0
     held_out_s: float = 60.0
-    randomized: float = 0.5
+    randomized: float = 0.3
     task_interval: tuple[float, float] | None = (2.0, 6.0)
     corner_share: float = 0.25
     shard_s: float = 15.0
@@ -80,7 +80,7 @@ class JobConfig:
     episodes: int = 20
     episode_s: float = 30.0
     command_interval: float = 5.0
-    round_episodes: int = 4
+    round_episodes: int = 2
     video_s: float = 4.0
 
     def __post_init__(self) -> None:
