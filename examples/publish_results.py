@@ -19,7 +19,7 @@ from typing import Any
 
 from dagger_config import PRESETS, JobConfig
 from expert_page import PICTURES, expert_block, expert_section
-from student_page import CHAPTERS, student_section
+from student_page import CHAPTERS, student_block, student_section
 
 from go1_mtl_gym import TASKS, env_id
 from go1_mtl_gym.errors import InvalidInputError
@@ -39,6 +39,8 @@ SETTINGS = {
     "channels": "channels",
     "clean_s": "clean demonstrations per gait [s]",
     "perturbed_s": "perturbed demonstrations per gait [s]",
+    "randomized": "share of perturbed episodes with other physics",
+    "task_interval": "time between changes of gait in them [s]",
     "held_out_s": "held-out demonstrations per gait [s]",
     "rounds": "DAgger rounds",
     "dagger_s": "per gait and round [s]",
@@ -47,6 +49,7 @@ SETTINGS = {
     "batch_size": "rows per gradient step",
     "clone_steps": "gradient steps of cloning",
     "round_steps": "gradient steps per round",
+    "clockless_s": "the student's walks that tell it the phase, per gait [s]",
     "episodes": "evaluation episodes per gait and learner",
     "episode_s": "duration of an episode [s]",
 }
@@ -227,6 +230,9 @@ def current_blocks(results: Path) -> dict[str, str]:
     if (results / "expert.json").is_file():
         expert = read_json(results / "expert.json")
         blocks["expert"] = expert_block(expert, _made_by(expert))
+    if (results / "student_commanded.json").is_file():
+        commanded = read_json(results / "student_commanded.json")
+        blocks["student"] = student_block(commanded, _made_by(commanded))
     return blocks
 
 
@@ -253,10 +259,10 @@ def _made_by(scores: Mapping[str, Any]) -> str:
 
 def _setting(config: JobConfig, name: str) -> str:
     value = getattr(config, name)
-    if name in OF_ROUNDS and not config.rounds:
+    if value is None or (name in OF_ROUNDS and not config.rounds):
         return "-"
     if isinstance(value, tuple):
-        return ", ".join(value) or "-"
+        return ", ".join(map(str, value)) or "-"
     return value if isinstance(value, str) else f"{value:g}"
 
 

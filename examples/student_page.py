@@ -48,6 +48,17 @@ def student_section(name: str, data: Mapping[str, Any], made_by: str, picture: b
     return [f"### {chapter.title}", chapter.table(data["report"]), f"{chapter.note} {made_by}", *shown]
 
 
+def student_block(data: Mapping[str, Any], made_by: str) -> str:
+    """The students of several training seeds, for README.md.
+
+    Args:
+        data: what ``student_commanded.json`` holds.
+        made_by: how it was made.
+    """
+    chapter = CHAPTERS["commanded"]
+    return "\n\n".join([chapter.table(data["report"]), f"{chapter.note} {made_by}"])
+
+
 # -- Tables ------------------------------------------------------------------------------------------------------------
 
 
