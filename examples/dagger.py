@@ -22,9 +22,9 @@ import headless
 NO_GL = headless.choose_gl()
 
 import joblib
-from dagger_config import JobConfig, parse
-from dagger_pictures import draw
-from dagger_students import new_policy, train_baseline
+from main_job.config import JobConfig, parse
+from main_job.pictures import draw
+from main_job.students import new_policy, train_baseline
 from tqdm.auto import tqdm
 
 import trainers

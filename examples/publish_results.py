@@ -17,9 +17,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from dagger_config import PRESETS, JobConfig
-from expert_page import PICTURES, expert_block, expert_section
-from student_page import CHAPTERS, student_block, student_section
+from expert_report.page import PICTURES, expert_block, expert_section
+from main_job.config import PRESETS, JobConfig
+from student_report.page import CHAPTERS, student_block, student_section
 
 from go1_mtl_gym import TASKS, env_id
 from go1_mtl_gym.errors import InvalidInputError

@@ -16,10 +16,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from expert_bars import compare
-from expert_figures import save_figures
-from expert_page import card_table, totals_text
-from expert_parts import QUICK, SECTIONS, Part, Section
+from expert_report.bars import compare
+from expert_report.figures import save_figures
+from expert_report.page import card_table, totals_text
+from expert_report.parts import QUICK, SECTIONS, Part, Section
 from publish_results import without_out
 from report_parts import measure_all
 

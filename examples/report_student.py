@@ -21,16 +21,16 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from expert_figures import save_figure
+from expert_report.figures import save_figure
 from publish_results import without_out
 from report_parts import measure_all
-from student_classes import changed
-from student_figures import FIGURES
-from student_lab import Walker, walkers
-from student_lessons import ALL
-from student_page import CHAPTERS
-from student_parts import SECTIONS, Section, parts_of
-from student_school import teach_all
+from student_report.classes import changed
+from student_report.figures import FIGURES
+from student_report.lab import Walker, walkers
+from student_report.lessons import ALL
+from student_report.page import CHAPTERS
+from student_report.parts import SECTIONS, Section, parts_of
+from student_report.school import teach_all
 
 from go1_mtl_gym import Go1Error
 from go1_mtl_gym.errors import InvalidInputError

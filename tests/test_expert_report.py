@@ -14,14 +14,14 @@ from go1_mtl_gym.env import Go1Env
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "examples"))
 
-import expert_bars  # noqa: E402
-import expert_lab  # noqa: E402
-import expert_limits  # noqa: E402
-import expert_page  # noqa: E402
-import expert_parts  # noqa: E402
-import expert_steady  # noqa: E402
-import expert_timing  # noqa: E402
 import report_expert  # noqa: E402
+from expert_report import bars as expert_bars  # noqa: E402
+from expert_report import lab as expert_lab  # noqa: E402
+from expert_report import limits as expert_limits  # noqa: E402
+from expert_report import page as expert_page  # noqa: E402
+from expert_report import parts as expert_parts  # noqa: E402
+from expert_report import steady as expert_steady  # noqa: E402
+from expert_report import timing as expert_timing  # noqa: E402
 
 HOP = Gait("hop", period=0.4, duty=0.5, offsets=(0.0, 0.0, 0.0, 0.0))
 

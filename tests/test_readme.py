@@ -83,7 +83,7 @@ def test_make_targets_exist():
 
 def test_named_options_exist(monkeypatch):
     monkeypatch.syspath_prepend(ROOT / "examples")
-    source = (ROOT / "examples" / "dagger_config.py").read_text(encoding="utf-8")
+    source = (ROOT / "examples" / "main_job" / "config.py").read_text(encoding="utf-8")
     options = re.search(r"Options: `(.*?)`", PROSE)[1].split()
     assert "--preset" in options
     assert sorted(options) == sorted(re.findall(r'"(--[a-z-]+)"', source))

@@ -16,11 +16,11 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "examples"))
 
 import report_student  # noqa: E402
-import student_budget  # noqa: E402
-import student_lessons  # noqa: E402
-import student_lessons_page  # noqa: E402
-import student_parts  # noqa: E402
-from dagger_students import new_policy  # noqa: E402
+from main_job.students import new_policy  # noqa: E402
+from student_report import budget as student_budget  # noqa: E402
+from student_report import lessons as student_lessons  # noqa: E402
+from student_report import lessons_page as student_lessons_page  # noqa: E402
+from student_report import parts as student_parts  # noqa: E402
 
 TINY = dataclasses.replace(
     student_budget.QUICK,

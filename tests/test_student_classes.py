@@ -11,10 +11,10 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "examples"))
 
-import student_classes  # noqa: E402
-import student_figures  # noqa: E402
-import student_page  # noqa: E402
-import student_sums  # noqa: E402
+from student_report import classes as student_classes  # noqa: E402
+from student_report import figures as student_figures  # noqa: E402
+from student_report import page as student_page  # noqa: E402
+from student_report import sums as student_sums  # noqa: E402
 
 
 def figures(succeeded, trials, error=0.02, **more):

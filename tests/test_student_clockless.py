@@ -19,12 +19,12 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "examples"))
 
 import report_student  # noqa: E402
-import student_clockless  # noqa: E402
-import student_lab  # noqa: E402
-import student_lessons_page  # noqa: E402
-import student_parts  # noqa: E402
-import student_phase  # noqa: E402
-from dagger_students import new_policy  # noqa: E402
+from main_job.students import new_policy  # noqa: E402
+from student_report import clockless as student_clockless  # noqa: E402
+from student_report import lab as student_lab  # noqa: E402
+from student_report import lessons_page as student_lessons_page  # noqa: E402
+from student_report import parts as student_parts  # noqa: E402
+from student_report import phase as student_phase  # noqa: E402
 
 TINY = dataclasses.replace(
     student_clockless.QUICK,
@@ -130,11 +130,11 @@ def test_less_is_not_recorded_than_is_seen():
 
 def test_rows_are_the_main_jobs_and_held_out_ones_are_others():
     config = student_clockless.ClocklessConfig()
-    assert (len(config.training), len(config.held_out)) == (4 * (60 + 240) / 15, 4 * 30 / 15)
+    assert (len(config.training), len(config.held_out)) == (4 * (60 + 300) / 15, 4 * 30 / 15)
     clean, disturbed = config.training[:16], config.training[16:]
     assert all(job.perturbation is None and "randomization" not in job.env_kwargs for job in clean)
     for job in (*disturbed, *config.held_out):
-        assert job.perturbation == config.job.disturbed(0.06) and job.env_kwargs["randomization"].share == 0.5
+        assert job.perturbation == config.job.disturbed(0.06) and job.env_kwargs["randomization"].share == 0.3
     assert all(job.env_kwargs["history"] == 6 for job in config.training)
     assert not {job.seed for job in config.training} & {job.seed for job in config.held_out}
 

@@ -20,11 +20,11 @@ sys.path.insert(0, str(ROOT / "examples"))
 import publish_results  # noqa: E402
 import report_parts  # noqa: E402
 import report_student  # noqa: E402
-import student_figures  # noqa: E402
-import student_lab  # noqa: E402
-import student_page  # noqa: E402
-import student_parts  # noqa: E402
-import student_pushes  # noqa: E402
+from student_report import figures as student_figures  # noqa: E402
+from student_report import lab as student_lab  # noqa: E402
+from student_report import page as student_page  # noqa: E402
+from student_report import parts as student_parts  # noqa: E402
+from student_report import pushes as student_pushes  # noqa: E402
 
 GAITS = ("trot", "walk")
 

@@ -17,17 +17,17 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "examples"))
 
 import dagger  # noqa: E402
-import dagger_config  # noqa: E402
 import publish_results  # noqa: E402
 import report_student  # noqa: E402
-import student_ablation  # noqa: E402
-import student_classes  # noqa: E402
-import student_commanded  # noqa: E402
-import student_parts  # noqa: E402
-import student_school  # noqa: E402
-from dagger_config import JobConfig  # noqa: E402
-from dagger_students import new_policy  # noqa: E402
-from student_lab import Walker  # noqa: E402
+from main_job import config as dagger_config  # noqa: E402
+from main_job.config import JobConfig  # noqa: E402
+from main_job.students import new_policy  # noqa: E402
+from student_report import ablation as student_ablation  # noqa: E402
+from student_report import classes as student_classes  # noqa: E402
+from student_report import commanded as student_commanded  # noqa: E402
+from student_report import parts as student_parts  # noqa: E402
+from student_report import school as student_school  # noqa: E402
+from student_report.lab import Walker  # noqa: E402
 
 TINY = {
     "rounds": 1,
@@ -57,7 +57,7 @@ def test_a_lesson_is_named_by_what_makes_the_student():
     )
     for unused in ({"n_envs": 7}, {"device": "cuda"}, {"episodes": 1}, {"preset": "smoke"}, {"video_s": 9.0}):
         assert student_school.lesson_name(JobConfig(seed=3, **unused)) == name
-    used = ({"seed": 4}, {"width": 64}, {"kp": 20.0}, {"rounds": 3}, {"clockless_s": 0.0}, {"takeover_rad": 0.1})
+    used = ({"seed": 4}, {"width": 64}, {"kp": 20.0}, {"rounds": 2}, {"clockless_s": 0.0}, {"takeover_rad": 0.1})
     names = {student_school.lesson_name(JobConfig(**({"seed": 3} | own))) for own in used}
     assert len(names | {name}) == 7
 

@@ -20,11 +20,11 @@ from trainers.metrics import wilson_interval
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "examples"))
 
-import expert_limits  # noqa: E402
-import student_lab  # noqa: E402
-import student_parts  # noqa: E402
-import student_pushes  # noqa: E402
-import student_robustness  # noqa: E402
+from expert_report import limits as expert_limits  # noqa: E402
+from student_report import lab as student_lab  # noqa: E402
+from student_report import parts as student_parts  # noqa: E402
+from student_report import pushes as student_pushes  # noqa: E402
+from student_report import robustness as student_robustness  # noqa: E402
 
 HOME = ActionMap.for_gains(PDGains()).from_radians(robot.HOME_POSE)
 

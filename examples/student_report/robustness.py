@@ -4,11 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
-from student_lab import EXPERT, summary
-
 import trainers
 from go1_mtl_gym.estimator import EstimatorNoise
 from go1_mtl_gym.observation import SensorNoise
+from student_report.lab import EXPERT, summary
 
 
 @dataclass(frozen=True)

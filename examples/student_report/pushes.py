@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from expert_lab import generator
-from expert_limits import CRUISE, DIRECTIONS, kick_w
+from expert_report.lab import generator
+from expert_report.limits import CRUISE, DIRECTIONS, kick_w
 
 from go1_mtl_gym import TASKS
 from trainers.environments import derive_seed, make_env

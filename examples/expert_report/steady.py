@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from expert_lab import Lab, generator
-from expert_limits import CRUISE
 
+from expert_report.lab import Lab, generator
+from expert_report.limits import CRUISE
 from go1_mtl_gym import TASKS, Gait, robot
 from go1_mtl_gym.actuation import PHYSICS_HZ
 from go1_mtl_gym.clock import next_phase

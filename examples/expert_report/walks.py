@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from expert_lab import Lab, generator, shared_range
 
+from expert_report.lab import Lab, generator, shared_range
 from go1_mtl_gym import TASKS
 
 

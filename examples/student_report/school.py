@@ -10,7 +10,7 @@ from typing import Any, TextIO
 
 import joblib
 import torch
-from dagger_config import JobConfig
+from main_job.config import JobConfig
 from report_parts import digest
 from tqdm.auto import tqdm
 

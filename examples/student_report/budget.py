@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dagger_config import JobConfig
-from dagger_students import new_policy
-from student_lab import Walker, summary
-from student_lessons import Pupil, kept_policy, pooled, rows_of, shard_jobs
+from main_job.config import JobConfig
+from main_job.students import new_policy
 
 import trainers
 from go1_mtl_gym.errors import InvalidInputError
+from student_report.lab import Walker, summary
+from student_report.lessons import Pupil, kept_policy, pooled, rows_of, shard_jobs
 
 
 @dataclass(frozen=True)

@@ -6,22 +6,22 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import student_budget
-import student_clockless
 from report_parts import digest, finished, sources
-from student_ablation import AblationConfig, ablation
-from student_budget import BudgetConfig, budget
-from student_classes import ABLATION, COMMANDED, SchoolClass
-from student_clockless import ClocklessConfig, clockless
-from student_commanded import CommandedConfig, commanded
-from student_lab import Walker
-from student_pushes import KickConfig, pushes
-from student_robustness import RobustnessConfig, robustness
-from student_switching import SwitchingConfig, switching
 
 import experts
 import go1_mtl_gym
 import trainers
+from student_report import budget as student_budget
+from student_report import clockless as student_clockless
+from student_report.ablation import AblationConfig, ablation
+from student_report.budget import BudgetConfig, budget
+from student_report.classes import ABLATION, COMMANDED, SchoolClass
+from student_report.clockless import ClocklessConfig, clockless
+from student_report.commanded import CommandedConfig, commanded
+from student_report.lab import Walker
+from student_report.pushes import KickConfig, pushes
+from student_report.robustness import RobustnessConfig, robustness
+from student_report.switching import SwitchingConfig, switching
 from trainers.checkpoint import versions
 from trainers.evaluation import controller
 

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from student_lab import summary
-
 import trainers
+from student_report.lab import summary
 
 DRAWN, CORNERS, CLOCKLESS = "drawn", "corners", "clockless"
 """Parts: commands from the inside of the range, from its corners, and from its inside for students without a clock."""

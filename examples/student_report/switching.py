@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from student_lab import summary
-
 import trainers
+from student_report.lab import summary
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,10 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
-from student_ablation import CHANGED
-from student_commanded import CLOCKLESS, CORNERS, DRAWN
-from student_lab import EXPERT
+
+from student_report.ablation import CHANGED
+from student_report.commanded import CLOCKLESS, CORNERS, DRAWN
+from student_report.lab import EXPERT
 
 Report = Mapping[str, Mapping[str, Mapping[str, Any]]]
 """{walker: {gait: {part: figures}}}."""

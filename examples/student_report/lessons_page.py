@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from expert_figures import legend, new_figure
+from expert_report.figures import legend, new_figure
 from matplotlib.figure import Figure
-from student_budget import drops
-from student_lessons import ALL
 
+from student_report.budget import drops
+from student_report.lessons import ALL
 from trainers.metrics import wilson_interval
 from trainers.report import markdown
 

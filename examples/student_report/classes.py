@@ -5,10 +5,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from dagger_config import PRESETS, JobConfig
-from student_commanded import CLOCKLESS, CORNERS, DRAWN
-from student_lab import EXPERT, Walker, walkers
-from student_school import UNUSED, Student
+from main_job.config import PRESETS, JobConfig
+
+from student_report.commanded import CLOCKLESS, CORNERS, DRAWN
+from student_report.lab import EXPERT, Walker, walkers
+from student_report.school import UNUSED, Student
 
 Found = dict[str, dict[str, dict[str, Any]]]
 """{walker: {gait: {part: figures}}}."""

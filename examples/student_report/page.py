@@ -4,15 +4,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from student_ablation import CHANGED_WORLD
-from student_classes import BARS, passes
-from student_commanded import CLOCKLESS, CORNERS, DRAWN
-from student_figures import BAR
-from student_lab import EXPERT
-from student_lessons_page import budget_table, clockless_table
-from student_robustness import QUANTITIES
-from student_sums import Count, Report, commanded_sums, gaits_of, variant_sums
-
+from student_report.ablation import CHANGED_WORLD
+from student_report.classes import BARS, passes
+from student_report.commanded import CLOCKLESS, CORNERS, DRAWN
+from student_report.figures import BAR
+from student_report.lab import EXPERT
+from student_report.lessons_page import budget_table, clockless_table
+from student_report.robustness import QUANTITIES
+from student_report.sums import Count, Report, commanded_sums, gaits_of, variant_sums
 from trainers.metrics import wilson_interval
 from trainers.report import markdown
 

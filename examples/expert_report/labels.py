@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from expert_lab import Lab, generator
 
+from expert_report.lab import Lab, generator
 from experts import NMPCExpert
 from experts.model import RobotModel
 from experts.phase import fit_phase

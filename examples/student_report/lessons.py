@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from dagger_config import JobConfig
-from student_lab import Walker, summary
+from main_job.config import JobConfig
 
 import trainers
+from student_report.lab import Walker, summary
 
 ALL = "all gaits"
 """Stands for the gait in parts that measure every gait of their student."""

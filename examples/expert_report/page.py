@@ -3,9 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from expert_bars import LABELS, NOTE, PROTOTYPE, compare, measured
-from expert_timing import MPC_HZ
-
+from expert_report.bars import LABELS, NOTE, PROTOTYPE, compare, measured
+from expert_report.timing import MPC_HZ
 from trainers.report import closed_loop_table, markdown
 
 CARD = (

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from student_lab import summary
-
 import trainers
+from student_report.lab import summary
 
 DRAWN, CHANGED = "drawn", "changed world"
 """Parts: the model's world, and another one. The others are the gaits that are changed to."""

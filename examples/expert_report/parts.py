@@ -6,16 +6,16 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from expert_lab import Lab
-from expert_labels import LabelsConfig, labels
-from expert_limits import LimitsConfig, PushConfig, limits, pushes
-from expert_steady import SteadyConfig, steady
-from expert_timing import MODE_TASKS, ModesConfig, TimingConfig, modes, timing
-from expert_walks import SoakConfig, SurvivalConfig, TransitionConfig, soak, survival, transitions
 from report_parts import digest, finished, sources
 
 import experts
 import go1_mtl_gym
+from expert_report.lab import Lab
+from expert_report.labels import LabelsConfig, labels
+from expert_report.limits import LimitsConfig, PushConfig, limits, pushes
+from expert_report.steady import SteadyConfig, steady
+from expert_report.timing import MODE_TASKS, ModesConfig, TimingConfig, modes, timing
+from expert_report.walks import SoakConfig, SurvivalConfig, TransitionConfig, soak, survival, transitions
 from go1_mtl_gym import TASKS
 from trainers.checkpoint import versions
 

@@ -6,11 +6,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dagger_config import JobConfig
-from dagger_students import new_policy
-from student_lab import Walker, summary
-from student_lessons import Pupil, kept_policy, pooled, rows_of, shard_jobs
-from student_phase import (
+from main_job.config import JobConfig
+from main_job.students import new_policy
+
+import trainers
+from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.observation import ObservationLayout, SensorNoise
+from student_report.lab import Walker, summary
+from student_report.lessons import Pupil, kept_policy, pooled, rows_of, shard_jobs
+from student_report.phase import (
     Estimate,
     ask_for_phase,
     asked_phase,
@@ -19,11 +23,7 @@ from student_phase import (
     with_correction,
     without_asked,
 )
-from student_switching import SwitchingConfig
-
-import trainers
-from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.observation import ObservationLayout, SensorNoise
+from student_report.switching import SwitchingConfig
 from trainers.clockless import clockless_layout
 
 TAUGHT, CORRECTED = "taught here", "correction {:g}"

@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from dagger_config import JobConfig
 
 import trainers
 from go1_mtl_gym import InvalidInputError
+from main_job.config import JobConfig
 
 
 def new_policy(config: JobConfig, env_kwargs: dict[str, Any], pooled: bool = False) -> trainers.MultiHeadPolicy:

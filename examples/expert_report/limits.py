@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from expert_lab import Lab, generator
 
+from expert_report.lab import Lab, generator
 from go1_mtl_gym import TASKS
 from trainers.environments import derive_seed
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from expert_lab import Lab
-from expert_limits import CRUISE, PushConfig, largest_push
 
+from expert_report.lab import Lab
+from expert_report.limits import CRUISE, PushConfig, largest_push
 from experts import NMPCConfig, NMPCExpert
 from experts.nmpc import WHOLE_BODY
 from go1_mtl_gym.actuation import PHYSICS_HZ

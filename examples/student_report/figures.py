@@ -4,17 +4,17 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
-from expert_figures import legend, new_figure, pair_matrix
+from expert_report.figures import legend, new_figure, pair_matrix
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from student_classes import BARS
-from student_commanded import DRAWN
-from student_lab import EXPERT
-from student_lessons_page import budget_figure, clockless_figure
-from student_pushes import PAIRS
-from student_robustness import QUANTITIES
-from student_sums import Count, Report, commanded_sums, gaits_of, seeds_of, variant_sums
 
+from student_report.classes import BARS
+from student_report.commanded import DRAWN
+from student_report.lab import EXPERT
+from student_report.lessons_page import budget_figure, clockless_figure
+from student_report.pushes import PAIRS
+from student_report.robustness import QUANTITIES
+from student_report.sums import Count, Report, commanded_sums, gaits_of, seeds_of, variant_sums
 from trainers.metrics import wilson_interval
 
 COLOURS = ("#2166ac", "#1b9e77", "#7570b3", "#e6ab02")

@@ -3,12 +3,12 @@
 from pathlib import Path
 from typing import Any
 
-from dagger_config import JobConfig
 from tqdm.auto import tqdm
 
 import trainers
 from go1_mtl_gym import TASKS
 from go1_mtl_gym.rendering import RenderingError
+from main_job.config import JobConfig
 
 PICTURE = {"width": 280, "height": 210, "fps": 25}
 

@@ -5,13 +5,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from expert_bars import PROTOTYPE
-from expert_limits import DIRECTIONS
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 
+from expert_report.bars import PROTOTYPE
+from expert_report.limits import DIRECTIONS
 from go1_mtl_gym import TASKS, robot
 
 OWN, BAR, PLAN = "#2166ac", "#d6604d", "0.82"

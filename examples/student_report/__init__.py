@@ -1,0 +1,1 @@
+"""The sections of the student's report; `examples/report_student.py` runs them."""
