@@ -23,6 +23,7 @@ NO_GL = headless.choose_gl()
 
 import joblib
 from main_job.config import JobConfig, parse
+from main_job.demonstrations import shard_jobs
 from main_job.pictures import draw
 from main_job.students import new_policy, train_baseline
 from tqdm.auto import tqdm
@@ -75,8 +76,9 @@ class Job:
         """Training rows (clean and perturbed) and held-out rows (clean, other commands and seeds)."""
         config = self.config
         disturbed = config.disturbed(NOISE_RAD)
-        train = self._jobs(config.clean_s, None, 0) + self._jobs(config.perturbed_s, disturbed, 1)
-        held_out = self._jobs(config.held_out_s, None, 2)
+        train = shard_jobs(config, config.clean_s, 0)
+        train += shard_jobs(config, config.perturbed_s, 1, disturbed, config.world)
+        held_out = shard_jobs(config, config.held_out_s, 2)
         with self.stage("demonstrations"):
             paths = trainers.collect_all(train + held_out, self.out / "demonstrations", config.n_envs, progress=True)
         shards = [trainers.Demonstrations.load(path) for path in paths]
@@ -84,18 +86,6 @@ class Job:
             trainers.Demonstrations.concatenate(shards[: len(train)]),
             trainers.Demonstrations.concatenate(shards[len(train) :]),
         )
-
-    def _jobs(self, seconds: float, disturbed: trainers.PerturbationConfig | None, block: int) -> list:
-        """Shards of `seconds` per task; their seeds lie in a block of their own."""
-        config = self.config
-        count = round(seconds / config.shard_s)
-        first = (config.seed * 10 + block) * 10_000
-        env_kwargs = config.env_kwargs | (config.world if disturbed else {})
-        return [
-            trainers.CollectJob(task, first + i, config.shard_s, None, disturbed, env_kwargs)
-            for i in range(count)
-            for task in config.tasks
-        ]
 
     # -- Students ------------------------------------------------------------------------------------------------------
 

@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from main_job.config import JobConfig
+from main_job.demonstrations import shard_jobs
 from main_job.students import new_policy
 
 import trainers
 from go1_mtl_gym.errors import InvalidInputError
 from student_report.lab import Walker, summary
-from student_report.lessons import Pupil, kept_policy, pooled, rows_of, shard_jobs
+from student_report.lessons import Pupil, kept_policy, pooled, rows_of
 
 
 @dataclass(frozen=True)
