@@ -22,6 +22,7 @@ import headless
 NO_GL = headless.choose_gl()
 
 import joblib
+import torch
 from main_job.config import JobConfig, parse
 from main_job.demonstrations import shard_jobs
 from main_job.pictures import draw
@@ -54,6 +55,7 @@ class Job:
     def __init__(self, config: JobConfig, out: Path) -> None:
         self.config = config
         self.out = out
+        torch.set_num_threads(config.threads)
         new_policy(config, config.env_kwargs)  # refuses impossible settings before anything is written
         self._claim()
         self._times_path = out / "parts" / "seconds.json"
@@ -109,9 +111,8 @@ class Job:
     def _dagger(self, policy: Any, train: trainers.Demonstrations, held_out: trainers.Demonstrations) -> Any:
         config = self.config
         disturbed = config.disturbed(ROUND_NOISE_RAD)
-        per_task = max(1, config.n_envs // len(config.tasks))
         kwargs = config.env_kwargs | config.world
-        venv = trainers.make_venv(config.tasks, per_task, kwargs, disturbed, subproc=config.n_envs > 1)
+        venv = trainers.make_venv(config.tasks, 1, kwargs, disturbed, subproc=config.n_envs > 1)
         try:
             trainer = trainers.DAggerTrainer(
                 venv,
@@ -176,7 +177,7 @@ class Job:
         if missing:
             jobs = min(len(missing), self.config.n_envs) if self.config.device == "cpu" else 1
             parallel = joblib.Parallel(n_jobs=jobs, return_as="generator_unordered")
-            calls = (joblib.delayed(train_baseline)(self.config, name, self.out, jobs) for name in missing)
+            calls = (joblib.delayed(train_baseline)(self.config, name, self.out, jobs == 1) for name in missing)
             with self.stage("baselines"):
                 for _ in tqdm(parallel(calls), "baselines", len(missing), unit="network"):
                     pass
@@ -253,7 +254,8 @@ class Job:
     def _claim(self) -> None:
         path = self.out / "config.json"
         settings = json_ready(dataclasses.asdict(self.config))
-        settings.pop("n_envs")
+        for name in ("n_envs", "threads"):
+            settings.pop(name)
         known = _read_json(path)
         if known is None:
             write_json(path, settings)

@@ -21,6 +21,7 @@ class JobConfig:
         seed: of everything random.
         n_envs: worker processes.
         device: of the training, "cpu" or "cuda".
+        threads: of the training on a CPU; their number can change the last digits of a result.
         channels: optional parts of the observation.
         history: proprioceptive frames in the observation.
         control_hz: rate of the policy [Hz].
@@ -55,6 +56,7 @@ class JobConfig:
     seed: int = 0
     n_envs: int = os.cpu_count() or 1
     device: str = "cpu"
+    threads: int = 1
     channels: tuple[str, ...] = ("command", "phase", "last_action")
     history: int = 1
     control_hz: int = 50
@@ -89,8 +91,8 @@ class JobConfig:
         unknown = [name for name in self.tasks if name not in TASKS]
         if unknown or not self.tasks:
             raise InvalidInputError(f"tasks must be some of {', '.join(TASKS)}; got {self.tasks}")
-        if self.rounds < 0 or self.n_envs < 1 or self.seed < 0:
-            raise InvalidInputError(f"rounds and seed must be >= 0 and n_envs >= 1, got {self}")
+        if self.rounds < 0 or self.n_envs < 1 or self.threads < 1 or self.seed < 0:
+            raise InvalidInputError(f"rounds and seed must be >= 0, n_envs and threads >= 1, got {self}")
 
     @property
     def env_kwargs(self) -> dict[str, Any]:
@@ -178,6 +180,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "held_out_s": 60.0,
         "shard_s": 30.0,
         "width": 2560,
+        "threads": os.cpu_count() or 1,
         "normalization": "min_max",
         "clone_steps": 30_000,
         "episodes": 5,

@@ -34,21 +34,20 @@ def new_policy(config: JobConfig, env_kwargs: dict[str, Any], pooled: bool = Fal
     return policy.to(torch.device(config.device))
 
 
-def train_baseline(config: JobConfig, name: str, out: Path, side_by_side: int) -> None:
+def train_baseline(config: JobConfig, name: str, out: Path, progress: bool) -> None:
     """Train "pooled" or "paper_literal" on all rows of a run and save it there.
 
     Args:
         config: of the run.
         name: which baseline.
         out: folder of the run.
-        side_by_side: how many are trained at once; each gets its share of the cores.
+        progress: show a bar.
     """
-    if side_by_side > 1:
-        torch.set_num_threads(max(1, config.n_envs // side_by_side))
+    torch.set_num_threads(config.threads)
     rows = trainers.Demonstrations.load(out / "parts" / "all_rows.npz")
     literal = name == "paper_literal"
     policy = new_policy(config, config.literal_env_kwargs if literal else config.env_kwargs, pooled=name == "pooled")
     steps = config.clone_steps + config.rounds * config.round_steps
     own = rows.proprioceptive() if literal else rows
-    trainers.train_bc(policy, own, dataclasses.replace(config.bc, steps=steps), progress=side_by_side == 1)
+    trainers.train_bc(policy, own, dataclasses.replace(config.bc, steps=steps), progress=progress)
     policy.save(out / "parts" / f"{name}.zip")

@@ -17,7 +17,7 @@ from tqdm.auto import tqdm
 import trainers
 from trainers.files import write_json
 
-UNUSED = ("preset", "n_envs", "device", "episodes", "video_s")
+UNUSED = ("preset", "n_envs", "device", "threads", "episodes", "video_s")
 """Settings of the main job that a lesson does not use; the others tell one student from another."""
 
 
@@ -45,8 +45,7 @@ def teach(config: JobConfig, root: Path) -> Student:
 
     It is made on one thread of this process, and a folder's name stands for its settings: called again, this reads what
     is there, and after an interruption it goes on. Bars and messages go to ``progress.log`` in the folder. An equal
-    main job gives an equal student, up to rounding where it sums on several threads, if it has fewer than two
-    processes per gait: more of them record other rounds.
+    main job on one thread gives an equal student.
 
     Args:
         config: of the main job; `UNUSED` settings are ignored.
