@@ -42,7 +42,7 @@ EXPERT = {
 BEGIN, END = "<!-- gaits:begin -->", "<!-- gaits:end -->"
 README = "\n".join(
     f"text before {name}\n<!-- {name}:begin -->\nold {name}\n<!-- {name}:end -->"
-    for name in ("results", "gaits", "expert", "paper", "presets")
+    for name in ("results", "gaits", "expert", "paper", "presets", "student")
 )
 
 
@@ -121,6 +121,21 @@ def test_the_report_card_takes_the_scores_place_once_it_is_there(run, root):
     assert "| trot | 1.7 | 1.6 | - | - |" in page and "](expert_pushes.png)" in page
     assert "](expert_limits.png)" not in page and "3 control steps" in page
     assert publish.main(["--check"], root) == 0
+
+
+def test_the_students_of_several_seeds_stand_in_the_readme(run, root):
+    figures = {"trials": 10, "succeeded": 9, "success_rate": 0.9, "velocity_error": 0.03, "error_ratio": 1.0}
+    found = {name: {"trot": {"drawn": figures}} for name in ("seed 0", "seed 1", "expert")}
+    report = {"section": "commanded", "report": found, "seed": 1, "seconds": {"students": 60.0, "commanded": 60.0}}
+    command = "python examples/report_student.py commanded --out-dir /home/somebody"
+    results = root / "docs" / "results"
+    results.mkdir(parents=True)
+    (results / "student_commanded.json").write_text(json.dumps(report | {"command": command}))
+    assert publish.main([str(run)], root) == 0
+    readme = (root / "README.md").read_text(encoding="utf-8")
+    block = readme.partition("<!-- student:begin -->")[2].partition("<!-- student:end -->")[0]
+    assert "| trot | **18/20** |" in block and "0.030" in block
+    assert "Made by `python examples/report_student.py commanded`, seed 1, in 2 min on one core." in block
 
 
 def test_publishing_twice_changes_nothing(run, root, capsys):
