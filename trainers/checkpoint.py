@@ -72,12 +72,14 @@ def save(policy: "MultiHeadPolicy | ClocklessPolicy", path: str | PathLike[str])
     except (TypeError, ValueError) as error:
         raise InvalidInputError(f"env_kwargs must be JSON values to be saved, got {policy.env_kwargs!r}") from error
 
+    files = {"policy.json": text, WEIGHTS: _to_bytes(student)}
+    if student is not policy:
+        files[PHASE_WEIGHTS] = _to_bytes(policy.estimator)
+
     def write(file: BinaryIO) -> None:
         with zipfile.ZipFile(file, "w") as archive:
-            archive.writestr("policy.json", text)
-            archive.writestr(WEIGHTS, _to_bytes(student))
-            if student is not policy:
-                archive.writestr(PHASE_WEIGHTS, _to_bytes(policy.estimator))
+            for name, content in files.items():
+                archive.writestr(zipfile.ZipInfo(name), content)  # without the time: equal policies are equal files
 
     write_atomically(path, write)
 

@@ -73,6 +73,12 @@ def test_kwargs_and_infinite_bounds_survive(tmp_path):
     assert other.observation_space == space
 
 
+def test_equal_policies_are_equal_files(saved, tmp_path, monkeypatch):
+    monkeypatch.setattr("time.time", lambda: 2_000_000_000.0)
+    trainers.load(saved[1]).save(tmp_path / "again.zip")
+    assert (tmp_path / "again.zip").read_bytes() == saved[1].read_bytes()
+
+
 def test_file_is_json_and_safetensors(saved):
     with zipfile.ZipFile(saved[1]) as archive:
         assert sorted(archive.namelist()) == ["policy.json", "weights.safetensors"]
