@@ -23,7 +23,7 @@ NO_GL = headless.choose_gl()
 
 import joblib
 import torch
-from main_job.config import JobConfig, parse
+from main_job.config import NOISE_RAD, ROUND_NOISE_RAD, JobConfig, parse
 from main_job.demonstrations import shard_jobs
 from main_job.pictures import draw
 from main_job.students import new_policy, train_baseline
@@ -35,10 +35,6 @@ from trainers.checkpoint import versions
 from trainers.files import json_ready, write_json
 
 BASELINES = ("pooled", "paper_literal")
-NOISE_RAD = 0.06
-"""Largest standard deviation of the noise on the expert's actions in disturbed demonstrations [rad]."""
-ROUND_NOISE_RAD = 0.02
-"""The same in DAgger rounds, where the learner disturbs enough [rad]."""
 
 
 class Job:

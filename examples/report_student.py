@@ -1,6 +1,6 @@
 """The student's report, one file and one figure per section, for the student and for the expert.
 
-python examples/report_student.py robustness --policy runs/students/seed-0/policy.zip    Ctrl-C and it goes on later
+python examples/report_student.py robustness --policy runs/default/policy.zip    Ctrl-C and it goes on later
 python examples/report_student.py switching pushes --policy randomised=a.zip --policy nominal=b.zip     two students
 python examples/report_student.py commanded --seeds 0 1 2 3 4          makes its own five students, in some hours
 python examples/report_student.py ablation                     makes its own, which differ in one setting each, in one

@@ -1,6 +1,6 @@
 """What a state estimator on the robot would get wrong; the expert can be asked for its answer to such a state."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import astuple, dataclass, fields, replace
 
 import numpy as np
 
@@ -47,6 +47,14 @@ class EstimatorNoise:
     def __post_init__(self) -> None:
         for each in fields(self):
             number_in(getattr(self, each.name), 0.0, 10.0, f"estimator noise {each.name}")
+
+    def scaled(self, factor: float) -> "EstimatorNoise":
+        """The same with every standard deviation multiplied by a factor.
+
+        Raises:
+            InvalidInputError: if a figure then exceeds 10.
+        """
+        return EstimatorNoise(*(factor * deviation for deviation in astuple(self)))
 
     def spread(self, suffix: str = "") -> np.ndarray:
         """The standard deviation of every number that is estimated, white or (suffix "_bias") constant, shape (33,)."""

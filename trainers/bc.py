@@ -15,6 +15,7 @@ from trainers import losses
 from trainers.batches import TensorBatches
 from trainers.dataset import Demonstrations
 from trainers.metrics import offline_metrics
+from trainers.optimization import adamw_one_cycle
 from trainers.policy import MultiHeadPolicy
 from trainers.tensorboard import make_logger
 
@@ -234,15 +235,14 @@ def _optimizer(
 ) -> tuple[torch.optim.Optimizer, torch.optim.lr_scheduler.LRScheduler]:
     """AdamW over the actor alone, which clips its gradients before each step, and its one-cycle schedule."""
     weights = list(policy.actor.parameters())
-    optimizer = torch.optim.AdamW(weights, lr=config.learning_rate, weight_decay=config.weight_decay, fused=True)
+    optimizer, schedule = adamw_one_cycle(
+        weights, config.learning_rate, config.weight_decay, config.steps, config.warmup
+    )
 
     def clip(*_: Any) -> None:
         torch.nn.utils.clip_grad_norm_(weights, config.max_grad_norm)
 
     optimizer.register_step_pre_hook(clip)
-    schedule = torch.optim.lr_scheduler.OneCycleLR(
-        optimizer, config.learning_rate, total_steps=config.steps + 1, pct_start=config.warmup, cycle_momentum=False
-    )
     return optimizer, schedule
 
 

@@ -72,8 +72,8 @@ class ClocklessPolicy(BasePolicy):
         self._turn = np.array([1.0 / (gait.period * self.env_kwargs.get("control_hz", 50)) for gait in gaits])
         self._can_stand = np.array([gait.can_stand for gait in gaits])
         self._command = layout.slices["command"]
-        self._columns = _columns(layout, clocked)
-        self._phase = clocked.slices["phase"]
+        self._columns = layout.columns(clockless_layout(student, 1))
+        self._phase = clocked.slices["phase"].start
 
     def predict(
         self,
@@ -120,9 +120,8 @@ class ClocklessPolicy(BasePolicy):
 
     def _with_clock(self, rows: np.ndarray, clock: np.ndarray) -> np.ndarray:
         """The student's observations."""
-        full = rows[:, self._columns]
-        full[:, self._phase] = clock
-        return full
+        before, after = np.split(rows[:, self._columns], [self._phase], axis=1)
+        return np.concatenate([before, clock, after], axis=1)
 
     def _predict(self, observation: torch.Tensor, deterministic: bool = False) -> torch.Tensor:
         actions, _ = self.predict(observation.cpu().numpy(), deterministic=deterministic)
@@ -249,12 +248,3 @@ def _turns(clock: np.ndarray) -> np.ndarray:
 def _sine_cosine(turns: np.ndarray) -> np.ndarray:
     """Sines and cosines, shape (n, 2), of phases [cycles]."""
     return np.stack([np.sin(2 * np.pi * turns), np.cos(2 * np.pi * turns)], axis=1)
-
-
-def _columns(layout: ObservationLayout, clocked: ObservationLayout) -> np.ndarray:
-    """Where the student's entries stand in the estimator's observation; anything for the phase, which is not there."""
-    columns = np.zeros(clocked.size, dtype=int)
-    for name, where in clocked.slices.items():
-        if name in layout.slices:
-            columns[where] = np.arange(where.stop - where.start) + layout.slices[name].start
-    return columns

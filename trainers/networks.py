@@ -1,6 +1,8 @@
 """The actor's network: one trunk, one head per task, and the routing of each row to its own head."""
 
+import contextlib
 from collections.abc import Sequence
+from typing import Any
 
 import torch
 from torch import nn
@@ -71,6 +73,18 @@ def _by_group(heads: Sequence[nn.Module], features: torch.Tensor, counts: list[i
     return torch.cat([head(rows) for head, rows in groups if len(rows)])
 
 
-def critic(n_inputs: int, width: int = 64) -> nn.Sequential:
-    """A small value network (two hidden layers); behaviour cloning never evaluates it."""
-    return nn.Sequential(nn.Linear(n_inputs, width), nn.ELU(), nn.Linear(width, width), nn.ELU(), nn.Linear(width, 1))
+def plain(n_inputs: int, n_outputs: int, width: int) -> nn.Sequential:
+    """A network of two hidden layers of `width` units; ELU."""
+    return nn.Sequential(
+        nn.Linear(n_inputs, width), nn.ELU(), nn.Linear(width, width), nn.ELU(), nn.Linear(width, n_outputs)
+    )
+
+
+def seeded(seed: int | None) -> contextlib.AbstractContextManager[Any]:
+    """A context in which torch draws from `seed`, and after which its generator is as it was; None changes nothing."""
+    if seed is None:
+        return contextlib.nullcontext()
+    stack = contextlib.ExitStack()
+    stack.enter_context(torch.random.fork_rng(devices=[]))
+    torch.manual_seed(seed)
+    return stack

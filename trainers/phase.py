@@ -12,6 +12,8 @@ from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.observation import ObservationLayout
 from trainers import normalization as norm
 from trainers.dataset import Demonstrations
+from trainers.networks import plain, seeded
+from trainers.optimization import adamw_one_cycle
 
 CLIP_SD = 6.0
 """Normalised inputs are clipped to +- this."""
@@ -40,11 +42,8 @@ class PhaseEstimator(nn.Module):
         self.layout = layout
         self.width = int(width)
         self.normalizer = norm.Normalizer(layout.size)
-        with torch.random.fork_rng(devices=[]):
-            torch.manual_seed(seed)
-            self.network = nn.Sequential(
-                nn.Linear(layout.size, width), nn.ELU(), nn.Linear(width, width), nn.ELU(), nn.Linear(width, 2)
-            )
+        with seeded(seed):
+            self.network = plain(layout.size, 2, width)
 
     def forward(self, obs: torch.Tensor) -> torch.Tensor:
         """(sine, cosine) of the phase, about of unit length, shape (n, 2), for observations of shape (n, D)."""
@@ -107,12 +106,8 @@ def train_phase(
     device = estimator.normalizer.shift.device
     estimator.normalizer.set(*norm.fit(seen, "mean_std"))
     inputs, target = torch.as_tensor(seen, device=device), torch.as_tensor(target, device=device)
-    optimizer = torch.optim.AdamW(
-        estimator.network.parameters(), lr=config.learning_rate, weight_decay=config.weight_decay, fused=True
-    )
-    schedule = torch.optim.lr_scheduler.OneCycleLR(
-        optimizer, config.learning_rate, total_steps=config.steps + 1, pct_start=0.1, cycle_momentum=False
-    )
+    weights = list(estimator.network.parameters())
+    optimizer, schedule = adamw_one_cycle(weights, config.learning_rate, config.weight_decay, config.steps)
     rng = np.random.default_rng(config.seed)
     for _ in tqdm(range(config.steps), "phase", unit="step", disable=not progress):
         batch = torch.from_numpy(rng.integers(len(seen), size=min(config.batch_size, len(seen)))).to(device)

@@ -1,6 +1,5 @@
 """The student: one network for all gaits, as a stable-baselines3 policy."""
 
-import contextlib
 from collections.abc import Mapping
 from os import PathLike
 from typing import Any
@@ -15,7 +14,10 @@ from torch import nn
 from go1_mtl_gym import TASKS
 from go1_mtl_gym.errors import InvalidInputError
 from trainers import normalization as norm
-from trainers.networks import MultiHeadActor, critic
+from trainers.networks import MultiHeadActor, plain, seeded
+
+CRITIC_WIDTH = 64
+"""Units of each hidden layer of the value network, which behaviour cloning never evaluates."""
 
 
 def _constant_rate(_progress: float) -> float:
@@ -93,9 +95,9 @@ class MultiHeadPolicy(ActorCriticPolicy):
     def _build(self, lr_schedule: Any) -> None:
         n_inputs = int(self.observation_space.shape[0]) - self.n_tasks
         n_actions = int(self.action_space.shape[0])
-        with _seeded(self.seed):
+        with seeded(self.seed):
             self.actor = MultiHeadActor(n_inputs, n_actions, 1 if self.pooled else self.n_tasks, self.width)
-            self.critic = critic(n_inputs + self.n_tasks)
+            self.critic = plain(n_inputs + self.n_tasks, 1, CRITIC_WIDTH)
         self.obs_normalizer = norm.Normalizer(n_inputs)
         self.act_normalizer = norm.Normalizer(n_actions)
         self.log_std = nn.Parameter(torch.full((n_actions,), float(self.log_std_init)))
@@ -246,16 +248,6 @@ class MultiHeadPolicy(ActorCriticPolicy):
         from trainers.checkpoint import load_as
 
         return load_as(MultiHeadPolicy, path, device)
-
-
-def _seeded(seed: int | None) -> contextlib.AbstractContextManager[Any]:
-    """A context in which torch draws from `seed`, and after which its generator is as it was."""
-    if seed is None:
-        return contextlib.nullcontext()
-    stack = contextlib.ExitStack()
-    stack.enter_context(torch.random.fork_rng(devices=[]))
-    torch.manual_seed(seed)
-    return stack
 
 
 def _check_arguments(

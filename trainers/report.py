@@ -73,8 +73,8 @@ def paper_table(metrics: Mapping[str, Any]) -> str:
     rows = []
     for task, scores in _tasks(metrics).items():
         multi, single, where = PAPER_R2.get(task, (None, None, "-"))
-        ours = [_number(scores.get(learner, {}).get("r2"), ".4f") for learner in ("multi_head", "pooled")]
-        rows.append([task, *ours, _number(multi, ".4f"), _number(single, ".4f"), where])
+        ours = [number(scores.get(learner, {}).get("r2"), ".4f") for learner in ("multi_head", "pooled")]
+        rows.append([task, *ours, number(multi, ".4f"), number(single, ".4f"), where])
     header = ["gait", "multi-head, here", "pooled, here", "multi-task, paper", "single-task, paper", "paper's setting"]
     return markdown(header, rows, text_columns=1)
 
@@ -137,10 +137,11 @@ def _learners(scores: Mapping[str, Any]) -> list[str]:
 
 def _cell(scores: Mapping[str, Any], key: str, how: str) -> str:
     value = scores.get(key)
-    return _share(value, scores.get("episodes")) if how == "share" else _number(value, how)
+    return _share(value, scores.get("episodes")) if how == "share" else number(value, how)
 
 
-def _number(value: float | None, how: str) -> str:
+def number(value: float | None, how: str) -> str:
+    """A number by a format; "-" for one that is not there."""
     return "-" if value is None or not math.isfinite(value) else format(value, how)
 
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from expert_report.bars import LABELS, NOTE, PROTOTYPE, compare, measured
 from expert_report.timing import MPC_HZ
-from trainers.report import closed_loop_table, markdown
+from trainers.report import closed_loop_table, markdown, number
 
 CARD = (
     "gait",
@@ -55,7 +55,7 @@ def card_table(expert: Mapping[str, Any]) -> str:
         episodes = closed.get("episodes")
         count = len(episodes) if isinstance(episodes, Sequence) else episodes
         success = f"{round(closed['success_rate'] * count)}/{count}" if count else "-"
-        back = _number(limits.get("-vx", {}).get("tracked"), ".1f")
+        back = number(limits.get("-vx", {}).get("tracked"), ".1f")
         times = report.get("timing", {}).get(gait, {})
         rows.append(
             [
@@ -68,8 +68,8 @@ def card_table(expert: Mapping[str, Any]) -> str:
                 _against(expert, gait, "lateral", ".1f"),
                 _against(expert, gait, "fore_aft", ".1f"),
                 _changes(report.get("transitions", {}).get(gait, {})),
-                _number(times.get("mpc_update_ms", {}).get("median"), ".2f"),
-                _number(times.get("real_time", {}).get("50", {}).get("expert"), ".1f"),
+                number(times.get("mpc_update_ms", {}).get("median"), ".2f"),
+                number(times.get("real_time", {}).get("50", {}).get("expert"), ".1f"),
             ]
         )
     return markdown(CARD, rows, text_columns=1)
@@ -127,7 +127,7 @@ def limits_table(expert: Mapping[str, Any]) -> str:
     rows = []
     for gait, own in expert["report"]["limits"].items():
         for axis, found in own.items():
-            errors = [_number(found[name], ".3f") for name in ("velocity_error", "yaw_rate_error")]
+            errors = [number(found[name], ".3f") for name in ("velocity_error", "yaw_rate_error")]
             more = " (end of the search)" if found["at_cap"] else ""
             rows.append([gait, axis, f"{found['survived']:g}{more}", *errors, f"{found['tracked']:g}"])
     header = ["gait", "axis", "survived", "velocity error there [m/s]", "yaw rate error there [rad/s]", "and tracked"]
@@ -138,7 +138,7 @@ def push_table(expert: Mapping[str, Any]) -> str:
     """Largest kick per gait and direction [m/s]."""
     names = ("left", "right", "forward", "backward")
     pushes = expert["report"]["pushes"]
-    rows = [[gait, *(_number(own.get(name), ".1f") for name in names)] for gait, own in pushes.items()]
+    rows = [[gait, *(number(own.get(name), ".1f") for name in names)] for gait, own in pushes.items()]
     return markdown(["gait", *(f"{name} [m/s]" for name in names)], rows)
 
 
@@ -160,7 +160,7 @@ def steady_table(expert: Mapping[str, Any]) -> str:
         for name, own in walks.items():
             command = " ".join(f"{value:.2f}" for value in own["command"])
             ranges = [" ".join(f"{v:.1f}" for v in own.get(key, ())) or "-" for key in ("roll_deg", "pitch_deg")]
-            rows.append([gait, name, command, *(_number(own.get(key), how) for key, how in columns.values()), *ranges])
+            rows.append([gait, name, command, *(number(own.get(key), how) for key, how in columns.values()), *ranges])
     header = ["gait", "walk", "command", *columns, "roll from, to [deg]", "pitch from, to [deg]"]
     return markdown(header, rows, text_columns=3)
 
@@ -183,8 +183,8 @@ def modes_table(expert: Mapping[str, Any]) -> str:
         times = expert["report"].get("timing", {}).get(gait, {}).get("mode_action_ms", {})
         for name, found in own.items():
             survived = f"{round(found['survival_rate'] * found['episodes'])}/{found['episodes']}"
-            values = [_number(found["velocity_error"], ".3f"), _number(found["lateral_push"], ".1f")]
-            rows.append([gait, name, survived, *values, _number(times.get(name, {}).get("median"), ".2f")])
+            values = [number(found["velocity_error"], ".3f"), number(found["lateral_push"], ".1f")]
+            rows.append([gait, name, survived, *values, number(times.get(name, {}).get("median"), ".2f")])
     header = ["gait", "settings", "survived", "velocity error [m/s]", "kick to the side [m/s]", "action [ms]"]
     return markdown(header, rows, text_columns=2)
 
@@ -232,13 +232,9 @@ def _against(expert: Mapping[str, Any], gait: str, name: str, how: str) -> str:
     here, bar = measured(expert, gait, name), getattr(PROTOTYPE.get(gait), name, None)
     missed = None not in (here, bar) and (here > bar + 1e-9 if name == "error" else here < bar - 1e-9)
     sign = ">" if name == "error" else "<"
-    return _number(here, how) + (f" ({sign} {bar:g})" if missed else "")
+    return number(here, how) + (f" ({sign} {bar:g})" if missed else "")
 
 
 def _changes(pairs: Mapping[str, Mapping[str, int]]) -> str:
     trials = sum(pair["trials"] for pair in pairs.values())
     return f"{sum(pair['survived'] for pair in pairs.values())}/{trials}" if trials else "-"
-
-
-def _number(value: float | None, how: str) -> str:
-    return "-" if value is None else format(value, how)

@@ -9,6 +9,11 @@ from go1_mtl_gym import PAPER_TASKS, TASKS, DomainRandomization, InvalidInputErr
 from go1_mtl_gym.observation import CHANNELS
 from trainers import BCConfig, DAggerConfig, PerturbationConfig
 
+NOISE_RAD = 0.06
+"""Largest standard deviation of the noise on the expert's actions in disturbed demonstrations [rad]."""
+ROUND_NOISE_RAD = 0.02
+"""The same in DAgger rounds, where the learner disturbs enough [rad]."""
+
 
 @dataclasses.dataclass(frozen=True)
 class JobConfig:

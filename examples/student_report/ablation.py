@@ -5,10 +5,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import trainers
+from student_report.commanded import DRAWN
 from student_report.lab import summary
+from student_report.switching import SwitchingConfig, switching
 
-DRAWN, CHANGED = "drawn", "changed world"
-"""Parts: the model's world, and another one. The others are the gaits that are changed to."""
+CHANGED = "changed world"
+"""A part beside `DRAWN` and the gaits that are changed to: drawn commands in another world than the model's."""
 CHANGED_WORLD = {"friction": 0.7, "payload_kg": 1.5, "action_delay_s": 0.01, "joint_friction": 0.5}
 """Arguments of `Go1Env`: the middles of the ranges of the report's section on robustness, together."""
 
@@ -21,28 +23,24 @@ class AblationConfig:
         episodes, changed_episodes: per gait, in the model's world and in the changed one.
         seconds: duration of each [s].
         command_interval: time between commands [s].
-        trials: changes of gait per ordered pair.
-        before_s, after_s: walking in the first gait and in the second [s].
+        switching: the changes of gait.
     """
 
     episodes: int = 20
     changed_episodes: int = 5
     seconds: float = 20.0
     command_interval: float = 5.0
-    trials: int = 3
-    before_s: float = 2.0
-    after_s: float = 6.0
+    switching: SwitchingConfig = SwitchingConfig(trials=3)
 
     def parts(self, task: str, tasks: Sequence[str]) -> tuple[str, ...]:
         """The two worlds, and the gaits that are changed to from `task`."""
-        return (DRAWN, CHANGED, *(name for name in tasks if name != task))
+        return (DRAWN, CHANGED, *self.switching.parts(task, tasks))
 
 
 def ablation(who: Any, task: str, what: str, config: AblationConfig, seed: int, **env_kwargs: Any) -> dict[str, Any]:
     """See `student_lab.summary`; the same commands for everybody."""
     if what not in (DRAWN, CHANGED):
-        spans = {"before_s": config.before_s, "after_s": config.after_s}
-        return summary(trainers.evaluate_switch(who, task, what, config.trials, seed, **spans, **env_kwargs))
+        return switching(who, task, what, config.switching, seed, **env_kwargs)
     result = trainers.evaluate(
         who,
         task,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from main_job.config import JobConfig
+from main_job.config import NOISE_RAD, ROUND_NOISE_RAD, JobConfig
 from main_job.demonstrations import shard_jobs
 from main_job.students import new_policy
 
@@ -64,8 +64,8 @@ class BudgetConfig:
     )
     budgets_s: tuple[float, ...] = (15.0, 30.0, 60.0, 120.0, 240.0)
     seeds: tuple[int, ...] = (0, 1)
-    noise_rad: float = 0.06
-    round_noise_rad: float = 0.02
+    noise_rad: float = NOISE_RAD
+    round_noise_rad: float = ROUND_NOISE_RAD
 
     def __post_init__(self) -> None:
         doubled = all(b == 2 * a for a, b in zip(self.budgets_s, self.budgets_s[1:]))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from main_job.config import JobConfig
+from main_job.config import NOISE_RAD, JobConfig
 from main_job.demonstrations import shard_jobs
 from main_job.students import new_policy
 
@@ -82,7 +82,7 @@ class ClocklessConfig:
 
     job: JobConfig = JobConfig(n_envs=1, history=6)
     held_out_s: float = 30.0
-    noise_rad: float = 0.06
+    noise_rad: float = NOISE_RAD
     switching: SwitchingConfig = SwitchingConfig(trials=3)
     noisy_s: float = 10.0
     given_episodes: int = 100

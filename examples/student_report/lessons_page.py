@@ -9,10 +9,10 @@ from matplotlib.figure import Figure
 
 from student_report.budget import drops
 from student_report.lessons import ALL
+from student_report.sums import Report, mean
 from trainers.metrics import wilson_interval
-from trainers.report import markdown
+from trainers.report import markdown, number
 
-Report = Mapping[str, Mapping[str, Mapping[str, Any]]]
 COLOURS = ("#d6604d", "#e6ab02", "#7570b3", "#1b9e77", "#2166ac")
 """Of the methods of "budget", in turn."""
 MEASURED = {"walking": ("#2166ac", "o"), "noisy": ("#e6ab02", "s"), "switching": ("#1b9e77", "^")}
@@ -38,7 +38,6 @@ def pooled_levels(seeds: Mapping[str, Any]) -> list[dict[str, Any]]:
     for levels in zip(*(part["levels"] for part in seeds.values()), strict=True):
         own = [level["pooled"] for level in levels]
         count = {name: sum(each[name] for each in own) for name in ("succeeded", "survived", "trials")}
-        errors = [each["velocity_error"] for each in own if each["velocity_error"] is not None]
         means = {name: float(np.mean([level[name] for level in levels])) for name in ("falls", "learner_share")}
         found.append(
             {
@@ -46,7 +45,7 @@ def pooled_levels(seeds: Mapping[str, Any]) -> list[dict[str, Any]]:
                 "success_rate": count["succeeded"] / count["trials"],
                 "success_interval": wilson_interval(count["succeeded"], count["trials"]),
                 "survival_rate": count["survived"] / count["trials"],
-                "velocity_error": float(np.mean(errors)) if errors else None,
+                "velocity_error": mean(each["velocity_error"] for each in own),
                 **count,
                 **means,
             }
@@ -64,7 +63,7 @@ def budget_table(report: Report) -> str:
         cells = [f"{level['success_rate']:.0%} ({level['survival_rate']:.0%})" for level in levels]
         counts = [f"{last['falls']:.1f}", f"{last['learner_share']:.0%}"]
         fell = ", ".join(budgets[i] for i in drops(levels)) or "none"
-        rows.append([name, *cells, _number(last["velocity_error"], 3), *counts, fell])
+        rows.append([name, *cells, number(last["velocity_error"], ".3f"), *counts, fell])
     more = ["velocity error [m/s]", "falls while collecting", "driven by the learner", "drops at"]
     return markdown(["", *budgets, *more], rows)
 
@@ -118,7 +117,8 @@ def clockless_table(report: Report) -> str:
         success = [_of(found["tasks"][gait], "succeeded") for gait in gaits]
         others = [_of(found[key], "succeeded") for key in ("switching", "noisy")]
         error = "-" if phase is None else f"{phase['median']:.3f}, {phase['p99']:.3f}"
-        rows.append([name, *success, _of(walking, "survived"), _number(walking["velocity_error"], 3), *others, error])
+        tracked = number(walking["velocity_error"], ".3f")
+        rows.append([name, *success, _of(walking, "survived"), tracked, *others, error])
     more = ["survived", "velocity error [m/s]", "changes of gait", "noisy sensors", "phase error [cycles]"]
     return markdown(["", *gaits, *more], rows)
 
@@ -155,7 +155,3 @@ def clockless_figure(report: Report) -> Figure:
 
 def _of(summed: Mapping[str, Any] | None, key: str) -> str:
     return f"{summed[key]}/{summed['trials']}" if summed else "-"
-
-
-def _number(value: float | None, digits: int) -> str:
-    return "-" if value is None else f"{value:.{digits}f}"

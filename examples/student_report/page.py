@@ -13,7 +13,7 @@ from student_report.lessons_page import budget_table, clockless_table
 from student_report.robustness import QUANTITIES
 from student_report.sums import Count, Report, commanded_sums, gaits_of, variant_sums
 from trainers.metrics import wilson_interval
-from trainers.report import markdown
+from trainers.report import markdown, number
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def commanded_table(report: Report) -> str:
     rows = []
     for gait in gaits_of(report):
         own = commanded_sums(report, gait)
-        tracked = [_number(own["expert_error"], ".3f"), "-"]
+        tracked = [number(own["expert_error"], ".3f"), "-"]
         success = ["-"] * 5
         if own[DRAWN][1]:
             low, high = wilson_interval(*own[DRAWN])
@@ -85,8 +85,8 @@ def ablation_table(report: Report) -> str:
     for name, tasks in report.items():
         own = variant_sums(tasks)
         counts = [own["gaits"].get(gait, (0, 0)) for gait in gaits]
-        numbers = [_number(own["error"], ".3f"), *(_count(own[what]) for what in ("switching", "changed"))]
-        rows.append([name, *map(_count, counts), *numbers, _number(own["r2"], ".4f")])
+        numbers = [number(own["error"], ".3f"), *(_count(own[what]) for what in ("switching", "changed"))]
+        rows.append([name, *map(_count, counts), *numbers, number(own["r2"], ".4f")])
     header = ["", *gaits, "velocity error [m/s]", "changes of gait", "changed world", "R2"]
     return markdown(header, rows)
 
@@ -140,12 +140,8 @@ def _count(count: Count, bar: float = 0.0) -> str:
 
 def _judged(value: float | None, figure: str, how: str) -> str:
     """A number; bold where it misses its bar, as one does that there is none of."""
-    text = _number(value, how)
+    text = number(value, how)
     return text if passes(figure, value) else f"**{text}**"
-
-
-def _number(value: float | None, how: str) -> str:
-    return "-" if value is None else format(value, how)
 
 
 def _middle(levels: list[dict[str, Any]]) -> dict[str, Any]:

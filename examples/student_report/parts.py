@@ -51,12 +51,13 @@ class Section:
     prepare: Callable[[Any, Path, int], None] | None = None
 
 
+QUICK_SWITCHING = SwitchingConfig(trials=1, before_s=0.5, after_s=3.0)
 SECTIONS = {
     "commanded": Section(commanded, CommandedConfig(), CommandedConfig(2, 1, 1, 4.0, 2.0), school=COMMANDED),
-    "switching": Section(switching, SwitchingConfig(), SwitchingConfig(trials=1, before_s=0.5, after_s=3.0)),
+    "switching": Section(switching, SwitchingConfig(), QUICK_SWITCHING),
     "robustness": Section(robustness, RobustnessConfig(), RobustnessConfig(1, 3.0, 1.5, every=2)),
     "pushes": Section(pushes, KickConfig(), KickConfig(2, grid=2, before_s=0.5, after_s=0.5)),
-    "ablation": Section(ablation, AblationConfig(), AblationConfig(2, 1, 4.0, 2.0, 1, 0.5, 3.0), school=ABLATION),
+    "ablation": Section(ablation, AblationConfig(), AblationConfig(2, 1, 4.0, 2.0, QUICK_SWITCHING), school=ABLATION),
     "budget": Section(budget, BudgetConfig(), student_budget.QUICK, prepare=student_budget.prepare),
     "clockless": Section(clockless, ClocklessConfig(), student_clockless.QUICK, prepare=student_clockless.prepare),
 }

@@ -1,7 +1,7 @@
 """How far the world may differ from the one that the student was trained in: one quantity at a time."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import trainers
@@ -81,9 +81,5 @@ def world(quantity: str, value: float, who: Any) -> dict[str, Any]:
     if quantity != "noise":
         return {quantity: value}
     if isinstance(who, str) and who == EXPERT:
-        return {"estimator_noise": _scaled(EstimatorNoise(), value)}
-    return {"noise": _scaled(SensorNoise(), value)}
-
-
-def _scaled(noise: Any, factor: float) -> Any:
-    return type(noise)(**{each.name: factor * getattr(noise, each.name) for each in fields(noise)})
+        return {"estimator_noise": EstimatorNoise().scaled(value)}
+    return {"noise": SensorNoise().scaled(value)}

@@ -1,0 +1,24 @@
+"""The optimiser and the schedule of everything that is trained here."""
+
+from collections.abc import Sequence
+
+import torch
+
+
+def adamw_one_cycle(
+    weights: Sequence[torch.nn.Parameter], learning_rate: float, weight_decay: float, steps: int, warmup: float = 0.1
+) -> tuple[torch.optim.Optimizer, torch.optim.lr_scheduler.LRScheduler]:
+    """AdamW, and a one-cycle schedule to be stepped after each of its steps.
+
+    Args:
+        weights: what is trained.
+        learning_rate: peak of the schedule.
+        weight_decay: of AdamW.
+        steps: gradient steps.
+        warmup: share of the steps before the peak.
+    """
+    optimizer = torch.optim.AdamW(weights, lr=learning_rate, weight_decay=weight_decay, fused=True)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(
+        optimizer, learning_rate, total_steps=steps + 1, pct_start=warmup, cycle_momentum=False
+    )
+    return optimizer, schedule
