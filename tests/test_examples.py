@@ -118,7 +118,7 @@ def test_the_clockless_student_is_the_student_with_an_estimate_of_the_phase(smok
     student, clockless = (trainers.load(smoke[0] / name) for name in ("policy.zip", "clockless.zip"))
     kept, given = clockless.student.state_dict(), student.state_dict()
     assert kept.keys() == given.keys() and all(bool((kept[name] == given[name]).all()) for name in given)
-    assert "phase" not in clockless.env_kwargs["channels"] and clockless.env_kwargs["history"] == 6
+    assert "phase" not in clockless.env_kwargs["channels"] and clockless.env_kwargs["history"] == 10
     assert clockless.correction == 1.0
 
 

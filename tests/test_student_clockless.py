@@ -57,7 +57,8 @@ def finished(**kwargs):
     student = new_policy(
         dataclasses.replace(TINY.job, width=8, history=1, **kwargs), TINY.job.env_kwargs | {"history": 1}
     )
-    return trainers.ClocklessPolicy(student, trainers.PhaseEstimator(clockless_layout(student, 6), 8))
+    layout = clockless_layout(student, student_clockless.FRAMES)
+    return trainers.ClocklessPolicy(student, trainers.PhaseEstimator(layout, 8))
 
 
 @pytest.fixture(scope="module")
@@ -124,7 +125,7 @@ def test_another_correction_stays_in_the_world_that_was_chosen():
 
 def test_less_is_not_recorded_than_is_seen():
     for change in ({"history": 5}, {"channels": ("command", "phase")}):
-        with pytest.raises(InvalidInputError, match="6 frames"):
+        with pytest.raises(InvalidInputError, match=f"{student_clockless.FRAMES} frames"):
             student_clockless.ClocklessConfig(dataclasses.replace(TINY.job, **change))
 
 
@@ -135,7 +136,7 @@ def test_rows_are_the_main_jobs_and_held_out_ones_are_others():
     assert all(job.perturbation is None and "randomization" not in job.env_kwargs for job in clean)
     for job in (*disturbed, *config.held_out):
         assert job.perturbation == config.job.disturbed(0.06) and job.env_kwargs["randomization"].share == 0.3
-    assert all(job.env_kwargs["history"] == 6 for job in config.training)
+    assert all(job.env_kwargs["history"] == student_clockless.FRAMES for job in config.training)
     assert not {job.seed for job in config.training} & {job.seed for job in config.held_out}
 
 
@@ -146,8 +147,7 @@ def test_variants_see_what_their_names_say(taught):
         sizes[name] = policy.observation_space.shape[0] - 2
         assert policy.action_space.shape == (12,)
         assert (estimate is not None) == ("phase" in name or "stages" in name)
-    more = 5 * 34
-    assert list(sizes.values()) == [34, 49, 49 + more, 49 + more, 49 + more, 49 + more, 51]
+    assert list(sizes.values()) == [34, 49, 49 + 2 * 34, *[49 + 9 * 34] * 4, 51]
     corrections = [taught.student(name)[0].correction for name in sizes if name.startswith("two")]
     assert corrections == [1.0, 0.2]
 

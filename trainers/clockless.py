@@ -154,7 +154,7 @@ class ClocklessPolicy(BasePolicy):
 def learn_without_clock(
     student: MultiHeadPolicy,
     seconds: float = 240.0,
-    history: int = 6,
+    history: int = 10,
     *,
     correction: float = 1.0,
     perturbation: PerturbationConfig | None = None,

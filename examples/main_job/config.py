@@ -82,7 +82,7 @@ class JobConfig:
     clone_steps: int = 6000
     round_steps: int = 2500
     clockless_s: float = 240.0
-    clockless_history: int = 6
+    clockless_history: int = 10
     clockless_steps: int = 4000
     episodes: int = 20
     episode_s: float = 30.0

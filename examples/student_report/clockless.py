@@ -48,15 +48,18 @@ class Variant:
     correction: float | None = None
 
 
+FRAMES = 10
+"""That the phase is told from; the main job's default."""
 FELT = ("command", "last_action")
 CLOCKED = ("command", "phase", "last_action")
 VARIANTS = {
     "paper-literal": Variant(()),
     "one frame": Variant(FELT),
-    "six frames": Variant(FELT, 6),
-    "six frames, phase asked for": Variant(FELT, 6, asked=True),
-    "two stages": Variant(FELT, 6, correction=1.0),
-    "two stages, clock with correction": Variant(FELT, 6, correction=0.2),
+    "three frames": Variant(FELT, 3),
+    "ten frames": Variant(FELT, FRAMES),
+    "ten frames, phase asked for": Variant(FELT, FRAMES, asked=True),
+    "two stages": Variant(FELT, FRAMES, correction=1.0),
+    "two stages, clock with correction": Variant(FELT, FRAMES, correction=0.2),
     "clock": Variant(CLOCKED),
 }
 """Everything that is taught here, by name; the last is the bound."""
@@ -80,7 +83,7 @@ class ClocklessConfig:
         InvalidInputError: if the job records less than the variants see.
     """
 
-    job: JobConfig = JobConfig(n_envs=1, history=6)
+    job: JobConfig = JobConfig(n_envs=1, history=FRAMES)
     held_out_s: float = 30.0
     noise_rad: float = NOISE_RAD
     switching: SwitchingConfig = SwitchingConfig(trials=3)
@@ -137,7 +140,7 @@ class ClocklessConfig:
 QUICK = ClocklessConfig(
     JobConfig(
         n_envs=1,
-        history=6,
+        history=FRAMES,
         clean_s=2.0,
         perturbed_s=2.0,
         shard_s=2.0,
