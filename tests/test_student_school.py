@@ -160,6 +160,7 @@ def test_students_without_a_clock_and_the_expert_are_measured_in_less(lesson):
         ("seed 2", "drawn"),
         ("seed 2", "corners"),
         ("seed 2 without a clock", "clockless"),
+        ("seed 2 without a clock", "clock with correction"),
         ("expert", "drawn"),
         ("expert", "corners"),
     ]
@@ -186,13 +187,17 @@ def calls(monkeypatch):
     return found
 
 
-def test_commanded_episodes_are_passed_on(calls):
+def test_commanded_episodes_are_passed_on(calls, monkeypatch):
+    monkeypatch.setattr(
+        student_commanded, "with_correction", lambda who, correction: f"{who} corrected by {correction}"
+    )
     config = student_commanded.CommandedConfig()
     for what in config.parts("walk", ("walk",)):
         assert student_commanded.commanded("expert", "walk", what, config, 7, kp=40.0)["succeeded"] == 1
-    assert [arguments for arguments, _ in calls] == [("expert", "walk", n, 30.0, 7) for n in (100, 20, 20)]
+    expected = [("expert", 100), ("expert", 20), ("expert", 20), ("expert corrected by 0.5", 20)]
+    assert [arguments for arguments, _ in calls] == [(who, "walk", n, 30.0, 7) for who, n in expected]
     corners = [kwargs.pop("corners") for _, kwargs in calls]
-    assert corners == [False, True, False]
+    assert corners == [False, True, False, False]
     assert all(kwargs == {"command_interval": 5.0, "kp": 40.0} for _, kwargs in calls)
 
 
@@ -230,6 +235,7 @@ def test_a_quick_run_makes_its_students_once(tmp_path, monkeypatch):
     assert list(commanded["report"]) == ["seed 1", "seed 1 without a clock", "expert"]
     own = commanded["report"]["seed 1"]["walk"]["drawn"]
     assert own["trials"] == 2 and set(own["passed"]) == set(commanded["bars"]) == set(student_classes.BARS)
+    assert set(commanded["report"]["seed 1 without a clock"]["walk"]) == {"clockless", "clock with correction"}
     assert commanded["report"]["expert"]["trot"]["corners"]["survived"] == 1
     assert commanded["seconds"]["students"] > 0.0 and len(commanded["policies"]) == 2
     assert list(ablation["report"]) == list(ablation["lessons"]) == ["default, reduced", "no round"]

@@ -7,7 +7,7 @@ from typing import Any
 
 from main_job.config import PRESETS, JobConfig
 
-from student_report.commanded import CLOCKLESS, CORNERS, DRAWN
+from student_report.commanded import CLOCKLESS, CORNERS, CORRECTED, DRAWN
 from student_report.lab import EXPERT, Walker, walkers
 from student_report.school import UNUSED, Student
 
@@ -56,7 +56,7 @@ def seed_walkers(students: Mapping[str, Student]) -> list[Walker]:
     """Every student, the same without a clock, and the expert."""
     *clocked, expert = walkers([f"{name}={student.policy}" for name, student in students.items()])
     clockless = [
-        Walker.student(name + WITHOUT_CLOCK, student.clockless, only=(CLOCKLESS,))
+        Walker.student(name + WITHOUT_CLOCK, student.clockless, only=(CLOCKLESS, CORRECTED))
         for name, student in students.items()
         if student.clockless
     ]

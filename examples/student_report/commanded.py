@@ -6,9 +6,11 @@ from typing import Any
 
 import trainers
 from student_report.lab import summary
+from student_report.phase import with_correction
 
-DRAWN, CORNERS, CLOCKLESS = "drawn", "corners", "clockless"
-"""Parts: commands from the inside of the range, from its corners, and from its inside for students without a clock."""
+DRAWN, CORNERS, CLOCKLESS, CORRECTED = "drawn", "corners", "clockless", "clock with correction"
+"""Parts: commands from the inside of the range, from its corners, and from its inside for students that are told no
+clock: those without any, and those that keep one of their own and correct it."""
 
 
 @dataclass(frozen=True)
@@ -19,6 +21,7 @@ class CommandedConfig:
         episodes, corner_episodes, clockless_episodes: of each part, per gait and student.
         seconds: duration of each [s].
         command_interval: time between commands [s].
+        correction: of the clocks that are corrected, see `trainers.ClocklessPolicy`.
     """
 
     episodes: int = 100
@@ -26,19 +29,20 @@ class CommandedConfig:
     clockless_episodes: int = 20
     seconds: float = 30.0
     command_interval: float = 5.0
+    correction: float = 0.5
 
     def parts(self, task: str, tasks: Sequence[str]) -> tuple[str, ...]:
         """The kinds of episodes."""
-        return (DRAWN, CORNERS, CLOCKLESS)
+        return (DRAWN, CORNERS, CLOCKLESS, CORRECTED)
 
 
 def commanded(who: Any, task: str, what: str, config: CommandedConfig, seed: int, **env_kwargs: Any) -> dict[str, Any]:
     """See `student_lab.summary`; the same commands for everybody."""
-    episodes = {DRAWN: config.episodes, CORNERS: config.corner_episodes, CLOCKLESS: config.clockless_episodes}
+    episodes = {DRAWN: config.episodes, CORNERS: config.corner_episodes}
     result = trainers.evaluate(
-        who,
+        with_correction(who, config.correction) if what == CORRECTED else who,
         task,
-        episodes[what],
+        episodes.get(what, config.clockless_episodes),
         config.seconds,
         seed,
         command_interval=config.command_interval,
