@@ -14,8 +14,7 @@ from go1_mtl_gym.simulation import Simulation
 from trainers import Demonstrations, TensorBatches, collect, make_env
 from trainers.environments import derive_seed
 from training_parts.loops import made_up
-from training_parts.settings import Settings
-from training_parts.steps import N_TASKS
+from training_parts.settings import N_TASKS, Settings
 from training_parts.timing import RATE, Heat, Turn, seconds
 
 SHARDS = 12

@@ -10,6 +10,8 @@ import torch
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import number_in
 
+N_TASKS = 4
+"""Of the made-up demonstrations, unless the number of heads is what varies."""
 QUICK = {
     "rounds": 2,
     "rows": 4000,
@@ -69,6 +71,8 @@ class Settings:
         for name in ("widths", "threads", "heads"):
             for value in getattr(self, name):
                 number_in(value, 1, 1e5, name)
+        if self.batch_size % N_TASKS:
+            raise InvalidInputError(f"batch_size must be a multiple of {N_TASKS}, got {self.batch_size}")
         number_in(self.rows, self.batch_size, 1e9, "rows")
         number_in(self.stored_rows, self.batch_size, 1e9, "stored_rows")
         number_in(self.collect_s, 0.01, 1e5, "collect_s")

@@ -7,10 +7,9 @@ import torch
 
 from trainers import BCConfig, BCTrainer, Demonstrations, MultiTaskLoss
 from training_parts.loops import bare, made_up, ours, stock, student
-from training_parts.settings import Settings
+from training_parts.settings import N_TASKS, Settings
 from training_parts.timing import RATE, WARM_UP, Heat, Stopwatch, Turn
 
-N_TASKS = 4
 PRECISIONS = {
     "highest": {},
     "high": {"matmul_precision": "high"},
