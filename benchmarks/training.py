@@ -42,7 +42,7 @@ GPU_DEFAULTS = {"batch_size": 65_536, "rows": 1_800_000, "steps": 50}
 
 
 def measure(options: argparse.Namespace) -> dict[str, Any]:
-    """The sections asked for; with `--resume`, those that the file holds of the same settings are taken from it.
+    """The sections asked for; with `--resume`, those that the same command wrote to the file are taken from there.
 
     After every section the file is written.
     """
@@ -73,11 +73,11 @@ def _section(name: str, settings: Settings) -> dict[str, Any]:
 
 
 def _finished(path: Path, wanted: dict[str, Any]) -> dict[str, Any]:
-    """Sections in a file that was made with the same settings, on the same machine, by the same versions."""
+    """Sections in a file that the same command made, on the same machine, with the same versions."""
     if not path.is_file():
         return {}
     found = json.loads(path.read_text(encoding="utf-8"))
-    same = all(found.get(name) == wanted[name] for name in ("config", "seed", "machine", "versions"))
+    same = all(found.get(name) == wanted[name] for name in ("command", "config", "machine", "versions"))
     return found["sections"] if same else {}
 
 
@@ -93,7 +93,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("--device", default="cpu", help="of the gradient steps: cpu (default) or cuda")
     parser.add_argument("--quick", action="store_true", help="little of everything")
     parser.add_argument("--out", type=Path, default=None, help="file of the results")
-    parser.add_argument("--resume", action="store_true", help="keep the sections that --out already holds")
+    parser.add_argument("--resume", action="store_true", help="go on with an interrupted run of this command")
     for field in numbers:
         several = isinstance(field.default, tuple)
         kind = type(field.default[0] if several else field.default)

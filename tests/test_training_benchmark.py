@@ -183,7 +183,7 @@ def test_a_quick_run_measures_everything(quick):
     assert str(out.parent) not in out.read_text(encoding="utf-8"), "no path of the machine"
 
 
-def test_going_on_keeps_what_was_measured_with_the_same_settings(quick, monkeypatch, tmp_path):
+def test_going_on_keeps_what_the_same_command_measured(quick, monkeypatch, tmp_path):
     out, result = quick
     copy = tmp_path / "training.json"
     part = {name: own for name, own in result["sections"].items() if name != "shuffling"}
@@ -198,10 +198,10 @@ def test_going_on_keeps_what_was_measured_with_the_same_settings(quick, monkeypa
     assert training.main(["--quick", "--resume", "--out", str(copy)]) == 0
     assert measured == ["shuffling"] and set(json.loads(copy.read_text())["sections"]) == set(training.SECTIONS)
     assert training.main(["--quick", "--resume", "--rounds", "1", "--out", str(copy)]) == 0
-    assert measured[1:] == list(training.SECTIONS), "other settings, all anew"
+    assert measured[1:] == list(training.SECTIONS), "another command, all anew"
     del measured[:]
     assert training.main(["--quick", "--sections", "heads", "--out", str(copy)]) == 0
-    assert measured == ["heads"]
+    assert measured == ["heads"] and list(json.loads(copy.read_text())["sections"]) == ["heads"]
 
 
 def test_options_reach_the_settings(monkeypatch):

@@ -1,6 +1,7 @@
 """What is measured, with how much of everything."""
 
 import dataclasses
+import os
 import platform
 from pathlib import Path
 from typing import Any
@@ -91,7 +92,7 @@ class Settings:
 def machine(settings: Settings) -> dict[str, Any]:
     """Model names of processor and device, and the number of cores."""
     device = torch.cuda.get_device_name(settings.device) if settings.on_gpu else "cpu"
-    return {"cpu": _cpu_name(), "device": device, "capability": torch.backends.cpu.get_cpu_capability()}
+    return {"cpu": _cpu_name(), "cores": os.cpu_count(), "device": device}
 
 
 def _cpu_name() -> str:
