@@ -264,7 +264,8 @@ class DAggerTrainer(imitation_dagger.DAggerTrainer):
             write_atomically(path, lambda file: file.write(text.encode()))
             return
         found = json.loads(path.read_text())
-        found["config"] = dataclasses.asdict(DAggerConfig()) | found.get("config", {})  # options that came later
+        for name, kind in (("config", DAggerConfig), ("bc_config", BCConfig)):  # with options that came later
+            found[name] = dataclasses.asdict(kind()) | found.get(name, {})
         if found != json.loads(text):
             raise ShardMismatchError(f"{self.scratch_dir} holds rounds made with other settings; use another folder")
 

@@ -38,6 +38,16 @@ class MultiHeadActor(nn.Module):
         """Outputs of shape (n, n_outputs) for inputs of shape (n, n_inputs) and head indices of shape (n,)."""
         return route(self.heads, self.trunk(x), head)
 
+    def in_blocks(self, x: torch.Tensor, rows: Sequence[int]) -> torch.Tensor:
+        """The same for inputs that come sorted by head.
+
+        Args:
+            x: shape (n, n_inputs).
+            rows: how many there are of each head; the CPU knows them, so it waits for no GPU.
+        """
+        features = self.trunk(x)
+        return self.heads[0](features) if len(self.heads) == 1 else _by_group(self.heads, features, rows)
+
 
 def route(heads: Sequence[nn.Module], features: torch.Tensor, head: torch.Tensor) -> torch.Tensor:
     """Apply to each row the head it names.
@@ -68,8 +78,8 @@ def route(heads: Sequence[nn.Module], features: torch.Tensor, head: torch.Tensor
     return _by_group(heads, features[order], counts)[back]
 
 
-def _by_group(heads: Sequence[nn.Module], features: torch.Tensor, counts: list[int]) -> torch.Tensor:
-    groups = zip(heads, features.split(counts))
+def _by_group(heads: Sequence[nn.Module], features: torch.Tensor, counts: Sequence[int]) -> torch.Tensor:
+    groups = zip(heads, features.split(list(counts)))
     return torch.cat([head(rows) for head, rows in groups if len(rows)])
 
 

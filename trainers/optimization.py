@@ -1,8 +1,23 @@
 """The optimiser and the schedule of everything that is trained here."""
 
-from collections.abc import Sequence
+import contextlib
+from collections.abc import Iterator, Sequence
 
 import torch
+
+PRECISIONS = ("highest", "high", "medium")
+"""Of float32 matrix products; `torch.set_float32_matmul_precision` says what they mean."""
+
+
+@contextlib.contextmanager
+def matmul_precision(precision: str) -> Iterator[None]:
+    """Within this context torch multiplies float32 matrices with one of `PRECISIONS`; after it, as it did before."""
+    before = torch.get_float32_matmul_precision()
+    torch.set_float32_matmul_precision(precision)
+    try:
+        yield
+    finally:
+        torch.set_float32_matmul_precision(before)
 
 
 def adamw_one_cycle(

@@ -1,6 +1,6 @@
 """The student: one network for all gaits, as a stable-baselines3 policy."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from typing import Any
 
@@ -151,9 +151,16 @@ class MultiHeadPolicy(ActorCriticPolicy):
         """Index of each row's task, int64, shape (n,)."""
         return obs[:, -self.n_tasks :].argmax(dim=1)
 
-    def mean_actions(self, obs: torch.Tensor) -> torch.Tensor:
-        """The deterministic actions, not clipped to the action space, shape (n, 12)."""
-        return self._means(self._normalised(obs), obs)
+    def mean_actions(self, obs: torch.Tensor, rows: Sequence[int] | None = None) -> torch.Tensor:
+        """The deterministic actions, not clipped to the action space, shape (n, 12).
+
+        Args:
+            obs: shape (n, D), any mix of tasks.
+            rows: how many there are of each task if they come sorted by task; None looks them up.
+        """
+        if rows is None:
+            return self._means(self._normalised(obs), obs)
+        return self.act_normalizer.inverse(self.actor.in_blocks(self._normalised(obs), rows))
 
     def _normalised(self, obs: torch.Tensor) -> torch.Tensor:
         return self.obs_normalizer(obs[:, : -self.n_tasks].float()).clamp(-self.clip_sd, self.clip_sd)

@@ -117,6 +117,42 @@ def benchmark_table(result: Mapping[str, Any]) -> str:
     return markdown(header, rows, text_columns=2)
 
 
+def training_table(result: Mapping[str, Any]) -> str:
+    """One table per section of ``benchmarks/training.py``: rates, and how they compare within each round.
+
+    Args:
+        result: {"sections": {name: {"meaning": text, "rows": [{"setting", "contestant", "figures": {figure: spread},
+            "over": {reference: {figure: spread}}}]}}}; a spread is {"median", "low", "high"}.
+
+    Raises:
+        InvalidInputError: if there are no sections in it.
+    """
+    sections = result.get("sections")
+    if not sections:
+        raise InvalidInputError(f'expected results with at least one section under "sections", got {sorted(result)}')
+    return "\n\n".join(f"**{own['meaning']}**\n\n{_section_table(own['rows'])}" for own in sections.values())
+
+
+def _section_table(rows: Sequence[Mapping[str, Any]]) -> str:
+    references = list(dict.fromkeys(name for row in rows for name in row["over"]))
+    others = list(dict.fromkeys(figure for row in rows for figure in row["figures"] if figure != "samples_per_s"))
+    cells = []
+    for row in rows:
+        ratios = [_spread(row["over"].get(name, {}).get("samples_per_s")) for name in references]
+        figures = [_spread(row["figures"].get(figure), ".2e") for figure in others]
+        rate = f"{row['figures']['samples_per_s']['median']:.0f}"
+        cells.append([row["setting"], row["contestant"], rate, *ratios, *figures])
+    header = ["setting", "contestant", "samples/s", *(f"x {name}" for name in references), *others]
+    return markdown(header, cells, text_columns=2)
+
+
+def _spread(spread: Mapping[str, float] | None, how: str = ".2f") -> str:
+    """Median and quartiles, "-" without."""
+    if spread is None:
+        return "-"
+    return f"{spread['median']:{how}} ({spread['low']:{how}} ... {spread['high']:{how}})"
+
+
 def markdown(header: Sequence[str], rows: Sequence[Sequence[str]], text_columns: int = 1) -> str:
     """A Markdown table; the first `text_columns` columns are set left, the others right. No newline at its end."""
     rule = [":--" if i < text_columns else "--:" for i in range(len(header))]

@@ -116,10 +116,13 @@ def test_folder_from_before_an_option_was_there(venv, demos, policy, tmp_path):
     path = tmp_path / "config.json"
     settings = json.loads(path.read_text())
     del settings["config"]["takeover_rad"], settings["config"]["round_weight"]
+    del settings["bc_config"]["matmul_precision"], settings["bc_config"]["autocast"]
     path.write_text(json.dumps(settings))
     DAggerTrainer(venv, policy, demos, scratch_dir=tmp_path)
     with pytest.raises(ShardMismatchError, match="other settings"):
         DAggerTrainer(venv, policy, demos, DAggerConfig(round_weight=2), scratch_dir=tmp_path)
+    with pytest.raises(ShardMismatchError, match="other settings"):
+        DAggerTrainer(venv, policy, demos, bc_config=BCConfig(autocast=True), scratch_dir=tmp_path)
 
 
 def test_training_without_collecting(venv, demos, policy, tmp_path):
