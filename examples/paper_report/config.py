@@ -28,10 +28,10 @@ class Table:
         name: of the table.
         gaits: names of the tasks, in head order.
         world: arguments of `go1_mtl_gym.Go1Env` that make data as the table's.
-        named: gait -> the command that the authors held out; empty if they name none.
+        named: gait -> the command that the authors held out, for all gaits; empty if they name none.
 
     Raises:
-        InvalidInputError: if a named command is not one of three numbers within its task's limit.
+        InvalidInputError: if commands are named for some gaits and not for others, or one is beyond its task's limit.
     """
 
     name: str
@@ -40,6 +40,8 @@ class Table:
     named: Mapping[str, Command] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        if self.named and set(self.named) != set(self.gaits):
+            raise InvalidInputError(f"commands must be named for none or all of {self.gaits}, got {[*self.named]}")
         for gait, command in self.named.items():
             TASKS[gait].check_command(command)
 

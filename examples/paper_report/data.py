@@ -45,7 +45,7 @@ def draw_apart(
 
 def commands(table: Table, gait: str, config: PaperConfig) -> dict[str, list[Command]]:
     """The commands of a gait by what they are for; those held out are `config.gap` from all that are trained on."""
-    largest, named = config.largest(gait), [table.named[gait]] if gait in table.named else []
+    largest, named = config.largest(gait), [table.named[gait]] if table.named else []
     rngs = [np.random.default_rng(derive_seed(table.name, gait, use, config.seed)) for use in (TRAIN, UNSEEN)]
     train = draw_apart(rngs[0], config.train_commands, largest, named, config.gap)
     unseen = draw_apart(rngs[1], config.unseen_commands, largest, [*train, *named], config.gap)
