@@ -1,7 +1,7 @@
 """The tables of arXiv 2505.08574 and ours beside them: paper.json, paper.md and figures.
 
 python examples/reproduce_paper.py simulation                                trot, jump, bound at 1 kHz; 512 wide
-python examples/reproduce_paper.py hardware                                  trot and walk, rates and noise of a robot
+python examples/reproduce_paper.py hardware hardware_half_noise              trot and walk, rates and noise of a robot
 python examples/reproduce_paper.py simulation hardware --widths 2560 --seeds 0          the paper's width, in a night
 python examples/reproduce_paper.py simulation --widths 512 2560 --device cuda             the same on a GPU, in minutes
 python examples/reproduce_paper.py simulation hardware --quick --out-dir runs/quick              a minute's worth
@@ -23,7 +23,7 @@ from typing import Any
 from expert_report.figures import save_figure
 from main_job.students import check_device
 from paper_report.config import FULL, QUICK, TABLES, PaperConfig
-from paper_report.data import collect
+from paper_report.data import TRAIN, collect, shard_jobs
 from paper_report.figures import contact_figure, loss_figure
 from paper_report.page import paper_page, score_table
 from paper_report.published import KINDS, MULTI_HEAD
@@ -59,7 +59,7 @@ def reproduce(name: str, config: PaperConfig, options: argparse.Namespace) -> tu
         "students": school.finished(options.kinds),
         "data": data.account(),
         "config": dataclasses.asdict(config),
-        "env_kwargs": table.env_kwargs,
+        "env_kwargs": shard_jobs(table, config)[TRAIN][0].as_dict()["env_kwargs"],
         "largest": {gait: config.largest(gait).tolist() for gait in table.gaits},
         "seed": config.seed,
         "versions": versions(),
@@ -78,9 +78,9 @@ def save_figures(name: str, found: dict[str, Any], school: School, folder: Path)
 
 
 def write_table(name: str, found: dict[str, Any], folder: Path) -> Path:
-    """Put a table into ``paper.json``, leave the other one as it is, and write ``paper.md`` anew.
+    """Put a table into ``paper.json``, leave the others as they are, and write ``paper.md`` anew.
 
-    Both stand in one file, so that the page can always show the paper as a whole, whichever table was made last.
+    All stand in one file, so that the page can always show the paper as a whole, whichever table was made last.
     """
     path = folder / f"{NAME}.json"
     tables = read_json(path)["tables"] if path.is_file() else {}
@@ -110,7 +110,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
     add = parser.add_argument
-    add("tables", nargs="+", choices=tuple(TABLES), help="which of the paper's tables")
+    add("tables", nargs="+", choices=tuple(TABLES), help="which; hardware_half_noise is beside hardware")
     add("--kinds", nargs="+", choices=tuple(KINDS), default=list(KINDS), help="of students")
     add("--widths", type=int, nargs="+", default=None, help=f"units per hidden layer; None: {FULL.widths}")
     add("--seeds", type=int, nargs="+", default=None, help=f"of the trainings; None: {FULL.seeds}")
@@ -143,7 +143,7 @@ def main(arguments: list[str] | None = None) -> int:
             found, school = reproduce(name, config, options)
             pictures = save_figures(name, found, school, options.out_dir)
             path = write_table(name, found | {"command": command}, options.out_dir)
-            table = score_table(name, found["students"], school.data.tests[0], paper=True)
+            table = score_table(school.table.published, found["students"], school.data.tests[0], paper=True)
             print(f"\n{table}\n\n{name}: {path}", *(f"picture: {picture}" for picture in pictures), sep="\n")
     except Go1Error as error:
         print(f"error: {error}", file=sys.stderr)

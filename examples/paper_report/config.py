@@ -1,4 +1,4 @@
-"""What the paper collected and trained, as settings: its two tables, and how much is made of them."""
+"""What the paper collected and trained, as settings: its tables, and how much is made of them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from experts import HARDWARE_LIKE
-from go1_mtl_gym import TASKS
+from go1_mtl_gym import TASKS, EstimatorNoise
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import finite_vector, number_in
 from trainers import BCConfig
@@ -25,7 +25,8 @@ class Table:
     """One table of the paper.
 
     Attributes:
-        name: of the table.
+        name: of the table here.
+        published: name of the paper's table that it stands beside, in `PUBLISHED`.
         gaits: names of the tasks, in head order.
         world: arguments of `go1_mtl_gym.Go1Env` that make data as the table's.
         named: gait -> the command that the authors held out, for all gaits; empty if they name none.
@@ -35,6 +36,7 @@ class Table:
     """
 
     name: str
+    published: str
     gaits: tuple[str, ...]
     world: Mapping[str, Any]
     named: Mapping[str, Command] = field(default_factory=dict)
@@ -51,21 +53,35 @@ class Table:
         own = {"tasks": self.gaits, "channels": (), "history": 1, "kp": 50.0, "kd": 2.0}
         return own | dict(self.world)
 
+    @property
+    def student_kwargs(self) -> dict[str, Any]:
+        """Of the students' environments: what only the expert notices is left out."""
+        return {name: value for name, value in self.env_kwargs.items() if name != "estimator_noise"}
+
 
 SIMULATION = Table(
+    "simulation",
     "simulation",
     ("trot", "jump", "bound"),
     {"control_hz": 1000},
     MappingProxyType({"trot": (0.7, 0.3, 0.0), "jump": (0.6, 0.3, 0.0), "bound": (0.5, 0.2, 0.0)}),
 )
-HARDWARE = Table("hardware", ("trot", "walk"), HARDWARE_LIKE)
-TABLES = MappingProxyType({table.name: table for table in (SIMULATION, HARDWARE)})
-"""Both tables by name."""
+HARDWARE = Table("hardware", "hardware", ("trot", "walk"), HARDWARE_LIKE)
+HALF_NOISE = Table(
+    "hardware_half_noise",
+    "hardware",
+    ("trot", "walk"),
+    {**HARDWARE_LIKE, "estimator_noise": EstimatorNoise().scaled(0.5)},
+)
+"""With the whole noise, what an expert makes of the true state differs from its noisy answer by more than the paper's
+students do from theirs."""
+TABLES = MappingProxyType({table.name: table for table in (SIMULATION, HARDWARE, HALF_NOISE)})
+"""The tables by name, in the order of the page."""
 
 
 @dataclass(frozen=True)
 class PaperConfig:
-    """How much is collected and how it is cloned, in both tables.
+    """How much is collected and how it is cloned, in every table.
 
     Attributes:
         train_commands: per gait; 20 in the paper.

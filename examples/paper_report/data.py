@@ -1,4 +1,4 @@
-"""Demonstrations of both tables: which commands, which shards, and the rows in them."""
+"""Demonstrations of a table: which commands, which shards, and the rows in them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

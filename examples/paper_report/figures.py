@@ -1,4 +1,4 @@
-"""Figures of both tables: the held-out loss, joint targets, and foot contacts."""
+"""Figures of a table: the held-out loss, joint targets, and foot contacts."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

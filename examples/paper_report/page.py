@@ -4,12 +4,18 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from go1_mtl_gym import EstimatorNoise
+from paper_report.config import TABLES
 from paper_report.data import NAMED, TRAIN, UNSEEN
 from paper_report.published import FIGURES, KINDS, PUBLISHED
 from paper_report.sums import Estimate, learners, scores, uses, verdicts
 from trainers.report import markdown, number
 
-TITLES = {"simulation": "Simulation", "hardware": "Hardware, and data like a robot's"}
+TITLES = {
+    "simulation": "Simulation",
+    "hardware": "Hardware, and data like a robot's",
+    "hardware_half_noise": "Hardware, and data like a robot's with half the noise",
+}
 SHOWN = {"mse": "MSE [rad^2]", "mae": "MAE [rad]", "r2": "R2", "r2_joint_mean": "R2, mean of joints"}
 DIGITS = {"mse": ".6f", "mae": ".5f", "r2": ".5f", "r2_joint_mean": ".5f"}
 USES = {NAMED: "the authors' held-out command", UNSEEN: "other held-out commands"}
@@ -52,14 +58,14 @@ def section(name: str, table: Mapping[str, Any], pictures: Sequence[str] = ()) -
     students = table["students"]
     parts = [f"## {TITLES[name]}"]
     for i, use in enumerate(uses(students)):
-        parts += [f"With {USES[use]}:", score_table(name, students, use, paper=i == 0)]
+        parts += [f"With {USES[use]}:", score_table(TABLES[name].published, students, use, paper=i == 0)]
     parts += [
         "Means over training seeds with the 95 % interval of Student's t where there are several. R2 is flattened over "
         "the joints, each about its own mean; how the paper averages its R2 is not stated.",
         "### Aims",
-        verdict_table(name, students),
+        verdict_table(TABLES[name].published, students),
         "### What differs",
-        differences(name, table),
+        differences(TABLES[name].published, table),
         "### Data and training",
         account_table(table["data"]),
         training_table(students),
@@ -73,7 +79,7 @@ def section(name: str, table: Mapping[str, Any], pictures: Sequence[str] = ()) -
 
 
 def score_table(name: str, students: Sequence[Mapping[str, Any]], use: str, paper: bool) -> str:
-    """One row per gait and learner, with the paper's rows before ours if wanted."""
+    """One row per gait and learner, with the rows of the paper's table of that name before ours if wanted."""
     rows = []
     for gait, published in PUBLISHED[name].items():
         for kind, figures in published.items() if paper else ():
@@ -138,7 +144,7 @@ def _better(worse: Sequence[str]) -> str:
 
 
 def differences(name: str, table: Mapping[str, Any]) -> str:
-    """What is not as in the paper, as a list."""
+    """What is not as in the paper's table of some name, as a list."""
     config, env = table["config"], table["env_kwargs"]
     loss = "the mean over rows and joints per gait, summed over gaits; the paper's is the sum over rows"
     points = [
@@ -159,12 +165,19 @@ def differences(name: str, table: Mapping[str, Any]) -> str:
         points.append(
             "World: the paper's walks are a real robot's. Ours is simulated, with the paper's rates (MPC 100 Hz, whole "
             f"body {env['control_hz']} Hz), white noise on the student's sensors, white noise and a bias per episode "
-            f"on the expert's estimate of the state, and {1000 * env['action_delay_s']:g} ms of delay. The two noises "
-            "are independent of each other, so a part of the expert's answer cannot be told from what the student sees."
+            f"on the expert's estimate of the state ({noise_factor(env['estimator_noise']):g} times the environment's "
+            f"default), and {1000 * env['action_delay_s']:g} ms of delay. The two noises are independent of each "
+            "other, so a part of the expert's answer cannot be told from what the student sees; on a robot, estimate "
+            "and observation come from the same readings."
         )
     else:
         points.append("World: MuJoCo with our model of the robot, flat ground, no noise, 1 kHz.")
     return "\n".join(f"- {point}" for point in points)
+
+
+def noise_factor(noise: bool | Mapping[str, float]) -> float:
+    """How large the estimator's noise is, in units of the default; True is the default."""
+    return 1.0 if noise is True else noise["velocity"] / EstimatorNoise().velocity
 
 
 def clipped(table: Mapping[str, Any]) -> str:

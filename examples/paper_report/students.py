@@ -1,4 +1,4 @@
-"""The students of both tables: trained once, measured on what was held out, and kept on disk."""
+"""The students of a table: trained once, measured on what was held out, and kept on disk."""
 
 import contextlib
 import dataclasses
@@ -118,7 +118,7 @@ class School:
             seed=student.seed,
             device=self.device,
         )
-        return new_policy(job, self.table.env_kwargs, pooled=student.kind in (POOLED, PER_GAIT))
+        return new_policy(job, self.table.student_kwargs, pooled=student.kind in (POOLED, PER_GAIT))
 
     def teach(self, student: Student, progress: bool = False) -> None:
         """Train, measure and write a student, unless it is there."""

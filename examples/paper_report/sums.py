@@ -13,7 +13,7 @@ from paper_report.published import FIGURES, KINDS, MULTI_HEAD, POOLED
 AIMS: Mapping[str, Mapping[str, float]] = MappingProxyType(
     {"simulation": {"trot": 0.99, "jump": 0.99, "bound": 0.99}, "hardware": {"trot": 0.971, "walk": 0.961}}
 )
-"""Table -> gait -> the R2 that a multi-head student is to exceed."""
+"""Table of the paper -> gait -> the R2 that a multi-head student is to exceed."""
 
 
 class Learner(NamedTuple):
@@ -97,7 +97,7 @@ def verdicts(name: str, students: Sequence[Mapping[str, Any]]) -> list[dict[str,
     """Whether every multi-head learner reaches its aim and beats its pooled counterpart.
 
     Args:
-        name: of the table.
+        name: of the table of the paper.
         students: what is known of them.
 
     Returns:
