@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import pickle
 import sys
 from pathlib import Path
 
@@ -63,6 +64,17 @@ def test_the_full_settings_are_the_papers():
     assert paper_config.HALF_NOISE.student_kwargs == hardware.student_kwargs
     assert hardware.env_kwargs == hardware.student_kwargs | {"estimator_noise": True}
     assert len(full.seeds) == 5 and full.normalization == "min_max"
+
+
+@pytest.mark.parametrize("table", paper_config.TABLES.values(), ids=lambda table: table.name)
+def test_a_table_goes_to_other_processes_and_its_shards_are_known_again(table):
+    assert pickle.loads(pickle.dumps(table)) == table
+    job = paper_data.shard_jobs(table, paper_config.FULL)["train"][0]
+    assert json.loads(json.dumps(job.as_dict())) == job.as_dict()
+    assert json.loads(json.dumps(table.student_kwargs)) == table.student_kwargs | {
+        "tasks": [*table.gaits],
+        "channels": [],
+    }
 
 
 @pytest.mark.parametrize(

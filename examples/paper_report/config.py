@@ -42,6 +42,8 @@ class Table:
     named: Mapping[str, Command] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        for name in ("world", "named"):
+            object.__setattr__(self, name, dict(getattr(self, name)))  # views of dictionaries cannot be pickled
         if self.named and set(self.named) != set(self.gaits):
             raise InvalidInputError(f"commands must be named for none or all of {self.gaits}, got {[*self.named]}")
         for gait, command in self.named.items():
@@ -64,7 +66,7 @@ SIMULATION = Table(
     "simulation",
     ("trot", "jump", "bound"),
     {"control_hz": 1000},
-    MappingProxyType({"trot": (0.7, 0.3, 0.0), "jump": (0.6, 0.3, 0.0), "bound": (0.5, 0.2, 0.0)}),
+    {"trot": (0.7, 0.3, 0.0), "jump": (0.6, 0.3, 0.0), "bound": (0.5, 0.2, 0.0)},
 )
 HARDWARE = Table("hardware", "hardware", ("trot", "walk"), HARDWARE_LIKE)
 HALF_NOISE = Table(
