@@ -2,8 +2,8 @@
 
 python examples/reproduce_paper.py simulation                                trot, jump, bound at 1 kHz; 512 wide
 python examples/reproduce_paper.py hardware hardware_half_noise              trot and walk, rates and noise of a robot
-python examples/reproduce_paper.py simulation hardware --widths 2560 --seeds 0          the paper's width, in a night
-python examples/reproduce_paper.py simulation --widths 512 2560 --device cuda             the same on a GPU, in minutes
+python examples/reproduce_paper.py simulation hardware --widths 2560 --seeds 0                       the paper's width
+python examples/reproduce_paper.py simulation --widths 512 2560 --device cuda                            both, on a GPU
 python examples/reproduce_paper.py simulation hardware --quick --out-dir runs/quick              a minute's worth
 
 Demonstrations and students are made once and kept in --parts; a call trains those that it asks for and that are not
