@@ -17,8 +17,7 @@ def new_policy(config: JobConfig, env_kwargs: dict[str, Any], pooled: bool = Fal
     Raises:
         InvalidInputError: if there can be no such environment or student, or the device is not there.
     """
-    if config.device != "cpu" and not (config.device.startswith("cuda") and torch.cuda.is_available()):
-        raise InvalidInputError(f"device must be cpu, or cuda where PyTorch finds a GPU; got {config.device!r}")
+    check_device(config.device)
     env = trainers.make_env(config.tasks[0], **env_kwargs)
     policy = trainers.MultiHeadPolicy(
         env.observation_space,
@@ -32,6 +31,17 @@ def new_policy(config: JobConfig, env_kwargs: dict[str, Any], pooled: bool = Fal
     )
     env.close()
     return policy.to(torch.device(config.device))
+
+
+def check_device(device: str) -> str:
+    """Return the name of a device that can be trained on.
+
+    Raises:
+        InvalidInputError: if it is neither the CPU nor a GPU that is there.
+    """
+    if device != "cpu" and not (device.startswith("cuda") and torch.cuda.is_available()):
+        raise InvalidInputError(f"device must be cpu, or cuda where PyTorch finds a GPU; got {device!r}")
+    return device
 
 
 def train_baseline(config: JobConfig, name: str, out: Path, progress: bool) -> None:

@@ -1,0 +1,176 @@
+"""What the paper collected and trained, as settings: its tables, and how much is made of them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from experts import HARDWARE_LIKE
+from go1_mtl_gym import TASKS, EstimatorNoise
+from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.validation import finite_vector, number_in
+from trainers import BCConfig
+from trainers.collection import EPISODE_S
+
+Command = tuple[float, float, float]
+"""(vx [m/s], vy [m/s], yaw rate [rad/s])."""
+MOST_COMMANDS = 100
+"""Most commands of one use; their seeds stand this far apart."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """One table of the paper.
+
+    Attributes:
+        name: of the table here.
+        published: name of the paper's table that it stands beside, in `PUBLISHED`.
+        gaits: names of the tasks, in head order.
+        world: arguments of `go1_mtl_gym.Go1Env` that make data as the table's.
+        named: gait -> the command that the authors held out, for all gaits; empty if they name none.
+
+    Raises:
+        InvalidInputError: if commands are named for some gaits and not for others, or one is beyond its task's limit.
+    """
+
+    name: str
+    published: str
+    gaits: tuple[str, ...]
+    world: Mapping[str, Any]
+    named: Mapping[str, Command] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in ("world", "named"):
+            object.__setattr__(self, name, dict(getattr(self, name)))  # views of dictionaries cannot be pickled
+        if self.named and set(self.named) != set(self.gaits):
+            raise InvalidInputError(f"commands must be named for none or all of {self.gaits}, got {[*self.named]}")
+        for gait, command in self.named.items():
+            TASKS[gait].check_command(command)
+
+    @property
+    def env_kwargs(self) -> dict[str, Any]:
+        """Of the environments: the paper's 34 numbers, the task id, and the gains of this project."""
+        own = {"tasks": self.gaits, "channels": (), "history": 1, "kp": 50.0, "kd": 2.0}
+        return own | dict(self.world)
+
+    @property
+    def student_kwargs(self) -> dict[str, Any]:
+        """Of the students' environments: what only the expert notices is left out."""
+        return {name: value for name, value in self.env_kwargs.items() if name != "estimator_noise"}
+
+
+SIMULATION = Table(
+    "simulation",
+    "simulation",
+    ("trot", "jump", "bound"),
+    {"control_hz": 1000},
+    {"trot": (0.7, 0.3, 0.0), "jump": (0.6, 0.3, 0.0), "bound": (0.5, 0.2, 0.0)},
+)
+HARDWARE = Table("hardware", "hardware", ("trot", "walk"), HARDWARE_LIKE)
+HALF_NOISE = Table(
+    "hardware_half_noise",
+    "hardware",
+    ("trot", "walk"),
+    {**HARDWARE_LIKE, "estimator_noise": EstimatorNoise().scaled(0.5)},
+)
+"""With the whole noise, what an expert makes of the true state differs from its noisy answer by more than the paper's
+students do from theirs."""
+TABLES = MappingProxyType({table.name: table for table in (SIMULATION, HARDWARE, HALF_NOISE)})
+"""The tables by name, in the order of the page."""
+
+
+@dataclass(frozen=True)
+class PaperConfig:
+    """How much is collected and how it is cloned, in every table.
+
+    Attributes:
+        train_commands: per gait; 20 in the paper.
+        unseen_commands: per gait, held out on top of those that the authors name.
+        seconds: recorded with each command [s], at most an episode; 30 in the paper.
+        span: largest |vx| and |vy| of a drawn command [m/s]; those of the paper. The yaw rate is 0.
+        gap: held-out commands are at least this far from every other one [m/s].
+        seed: of commands and episodes; trainings have their own.
+        widths: units of every hidden layer, a student each; 2560 in the paper.
+        seeds: of the trainings.
+        steps: gradient steps of every training.
+        batch_size: rows per step, shared evenly among the gaits.
+        learning_rate: peak of the one-cycle schedule.
+        normalization: of inputs and outputs; the paper's is "min_max".
+        space: of the loss, see `trainers.BCConfig`.
+        curve_points: entries of a curve of the held-out loss.
+        curve_rows: held-out rows per gait that such an entry is measured on.
+
+    Raises:
+        InvalidInputError: if a figure is outside its range.
+    """
+
+    train_commands: int = 20
+    unseen_commands: int = 10
+    seconds: float = EPISODE_S
+    span: tuple[float, float] = (0.8, 0.5)
+    gap: float = 0.05
+    seed: int = 0
+    widths: tuple[int, ...] = (512,)
+    seeds: tuple[int, ...] = (0, 1, 2, 3, 4)
+    steps: int = 20_000
+    batch_size: int = 1024
+    learning_rate: float = 2e-3
+    normalization: str = "min_max"
+    space: str = "radians"
+    curve_points: int = 40
+    curve_rows: int = 3000
+
+    def __post_init__(self) -> None:
+        for name in ("train_commands", "unseen_commands"):
+            number_in(getattr(self, name), 1, MOST_COMMANDS, name)
+        number_in(self.seconds, 0.1, EPISODE_S, "seconds")
+        number_in(self.seed, 0, 10_000, "seed")
+        for name, high in (("widths", 1e5), ("seeds", 2**31 - 1)):
+            own = getattr(self, name)
+            if not own or len(set(own)) < len(own):
+                raise InvalidInputError(f"{name} must be different numbers, at least one, got {own}")
+            for value in own:
+                number_in(value, name == "widths", high, name)
+        for name in ("curve_points", "curve_rows"):
+            number_in(getattr(self, name), 1, 1e6, name)
+        if not (finite_vector(self.span, 2, "span") > 0).all() or not self.gap >= 0:
+            raise InvalidInputError(f"span must be positive and gap >= 0, got {self.span} and {self.gap}")
+        self.bc(0, 1.0)
+
+    def bc(self, seed: int, share: float) -> BCConfig:
+        """How to clone.
+
+        Args:
+            seed: of the order of the rows.
+            share: of the gaits that the student learns; a network of one gait draws as many of its rows per step as
+                a network of all gaits does.
+        """
+        return BCConfig(
+            steps=self.steps,
+            batch_size=max(1, round(self.batch_size * share)),
+            learning_rate=self.learning_rate,
+            space=self.space,
+            log_interval=max(1, round(self.steps / self.curve_points)),
+            seed=seed,
+        )
+
+    def largest(self, gait: str) -> np.ndarray:
+        """Largest |vx|, |vy| [m/s] and |yaw rate| [rad/s] that are drawn: `span`, within the task's limit."""
+        return np.minimum([*self.span, 0.0], TASKS[gait].command_limit)
+
+
+FULL = PaperConfig()
+QUICK = PaperConfig(
+    train_commands=2,
+    unseen_commands=1,
+    seconds=1.0,
+    widths=(16,),
+    seeds=(0, 1),
+    steps=60,
+    batch_size=96,
+    curve_points=3,
+    curve_rows=100,
+)
+"""Everything is made, nothing is made well."""
