@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from trainers.learner import Learner
     from trainers.losses import MultiTaskLoss
     from trainers.metrics import offline_metrics
+    from trainers.new_task import learn_task
     from trainers.phase import PhaseConfig, PhaseEstimator, phase_errors, train_phase
     from trainers.policy import MultiHeadPolicy
     from trainers.pretrained import load_pretrained
@@ -59,6 +60,7 @@ _HOME = {
     "evaluate": "evaluation",
     "evaluate_switch": "switching",
     "joint_target_figure": "figures",
+    "learn_task": "new_task",
     "learn_without_clock": "clockless",
     "load": "checkpoint",
     "load_pretrained": "pretrained",
@@ -107,6 +109,7 @@ __all__ = [
     "evaluate",
     "evaluate_switch",
     "joint_target_figure",
+    "learn_task",
     "learn_without_clock",
     "load",
     "load_pretrained",
