@@ -79,14 +79,15 @@ def learn_task(
             another size.
     """
     if policy.pooled or not len(dataset):
-        raise InvalidInputError(f"rows and a policy with heads were expected, got {len(dataset)} and {policy.pooled=}")
-    tasks = tasks_of(policy)
+        kind = "pooled policy" if policy.pooled else "policy with heads"
+        raise InvalidInputError(f"a policy with heads and rows were expected, got a {kind} and {len(dataset)} rows")
     more = {"logger": logger, "progress": progress, "fit_normalization": False}
     if rehearsal is None:
-        trained = tuple(dataset.per_task())
-        stand_in = _heads_alone(policy, trained)
-        own = None if validation is None else trunk_features(policy, validation).with_tasks(trained)
-        return train_bc(stand_in, trunk_features(policy, dataset).with_tasks(trained), config, own, **more)
+        names = tuple(dataset.per_task())
+        rows = trunk_features(policy, dataset).with_tasks(names)
+        own = None if validation is None else trunk_features(policy, validation).with_tasks(names)
+        return train_bc(_heads_alone(policy, names), rows, config, own, **more)
+    tasks = tasks_of(policy)
     rows = Demonstrations.concatenate([dataset.with_tasks(tasks), rehearsal.with_tasks(tasks)])
     own = None if validation is None else validation.with_tasks(tasks)
     return train_bc(policy, rows, config, own, **more)
