@@ -3,7 +3,7 @@
 import inspect
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -56,11 +56,10 @@ class GaitPart:
     seed: int
     folder: Path
 
-    @cached_property
+    @property
     def shared(self) -> Path:
         """Folder of demonstrations and students; its name changes with all that could change them."""
-        code = (sources(experts, go1_mtl_gym, trainers), *map(inspect.getsource, MEASURING))
-        return self.folder / f"new_gaits-{digest((self.base.sha256, repr(self.section), repr(versions()), *code))}"
+        return self.folder / f"new_gaits-{digest((self.base.sha256, repr(self.section), *_code()))}"
 
     @property
     def path(self) -> Path:
@@ -80,6 +79,12 @@ class GaitPart:
             figures = lesson.measure(self.seed)
             what = f"{self.method}, {self.seconds:g} s, seed {self.train_seed}"
         return {"task": self.gait, "what": what, "figures": figures}
+
+
+@cache
+def _code() -> tuple[str, ...]:
+    """The code that figures depend on, and the versions of packages."""
+    return (sources(experts, go1_mtl_gym, trainers), *map(inspect.getsource, MEASURING), repr(versions()))
 
 
 def parts_of(base: Walker, gaits: Sequence[str], config: NewGaitsConfig, seed: int, folder: Path) -> list[GaitPart]:
