@@ -21,7 +21,7 @@ import new_gaits  # noqa: E402
 from gait_report import config as gait_config  # noqa: E402
 from gait_report import methods as gait_methods  # noqa: E402
 from gait_report import parts as gait_parts  # noqa: E402
-from gait_report.methods import FROZEN, SCRATCH, TUNED  # noqa: E402
+from gait_report.methods import ASSISTED, FROZEN, SCRATCH, TUNED  # noqa: E402
 from main_job.students import new_policy  # noqa: E402
 from student_report.lab import Walker  # noqa: E402
 
@@ -155,8 +155,10 @@ def test_every_method_teaches_what_it_says(base, folder):
         equal = all(torch.equal(after[name], value) for name, value in before.items() if name.startswith("actor"))
         assert equal == (method == FROZEN) and policies[method].env_kwargs["tasks"] == ("trot", "walk", "pace")
         assert torch.equal(after["obs_normalizer.shift"], before["obs_normalizer.shift"])
-    untrained = base.load().add_task("pace", 0).actor.heads[2][-1].weight
-    assert not torch.equal(policies[FROZEN].actor.heads[2][-1].weight, untrained)
+    heads = policies[FROZEN].actor.heads
+    assert not any(torch.equal(heads[2][-1].weight, heads[k][-1].weight) for k in (0, 1)), "it has learned"
+    first = [head[0].weight.detach() for head in heads]
+    assert min((first[2] - first[k]).abs().max().item() for k in (0, 1)) < 0.05, "it began as a copy"
     assert policies[SCRATCH].env_kwargs["tasks"] == ("pace",) and len(policies[SCRATCH].actor.heads) == 1
     assert policies[SCRATCH].width == base.load().width
 
@@ -178,6 +180,30 @@ def test_the_frozen_head_leaves_old_gaits_and_a_network_of_its_own_has_none(base
     assert not {"changes", "old"} & set(scratch)
 
 
+@pytest.mark.parametrize(
+    ("seconds", "expected"),
+    [(15.0, (15.0, 0.0)), (30.0, (15.0, 15.0)), (45.0, (15.0, 30.0)), (60.0, (30.0, 30.0)), (240.0, (120.0, 120.0))],
+)
+def test_half_of_the_labels_is_demonstrated_in_whole_shards(seconds, expected):
+    assert gait_methods.halves(seconds, 15.0) == expected
+
+
+def test_a_round_adds_as_many_labels_as_there_were_demonstrations(base, folder, monkeypatch):
+    seen, taught = [], trainers.learn_task
+
+    def watched(policy, dataset, *args, **kwargs):
+        seen.append((len(dataset), policy.env_kwargs["tasks"]))
+        return taught(policy, dataset, *args, **kwargs)
+
+    monkeypatch.setattr(trainers, "learn_task", watched)
+    own = gait_methods.Lesson(base, "pace", ASSISTED, 2.0, 0, TINY, folder)
+    figures = own.measure(seed=1)
+    assert seen == [(50, ("trot", "walk", "pace")), (100, ("trot", "walk", "pace"))]
+    assert figures["changes"]["equal"] and "old" not in figures
+    rows = trainers.Demonstrations.load(next((folder / "rounds").rglob("demonstrations.npz")))
+    assert set(rows.per_task()) == {"pace"} and rows.seconds == 1.0 and rows.meta["beta"] == 0.0
+
+
 def test_equal_seeds_teach_equal_students(base, folder, tmp_path):
     students = [lesson(base, FROZEN, *where).policy() for where in ((folder,), (tmp_path,), (tmp_path, 1))]
     first, again, other = (own.actor.heads[2][0].weight for own in students)
@@ -196,7 +222,7 @@ def test_the_expert_and_the_policy_before_are_measured_too(base):
 
 def test_all_parts_come_once_and_the_longest_lessons_first(base, tmp_path):
     parts = gait_parts.parts_of(base, ["pace", "gallop"], gait_config.NewGaitsConfig(), 1, tmp_path)
-    assert len(parts) == 1 + 2 + 2 * 3 * 5 * 3 == len({part.path for part in parts})
+    assert len(parts) == 1 + 2 + 2 * 4 * 5 * 3 == len({part.path for part in parts})
     assert [part.method for part in parts[:3]] == ["before", "expert", "expert"]
     assert [part.seconds for part in parts[3:]] == sorted((part.seconds for part in parts[3:]), reverse=True)
     assert len({part.shared for part in parts}) == 1
@@ -242,10 +268,10 @@ def test_parts_are_put_in_order(base, tmp_path):
     results = [{"figures": {"n": i}} for i in range(len(parts))]
     data = gait_parts.assembled(parts, results)
     assert data["before"] == {"n": 0} and data["expert"] == {"pace": {"n": 1}}
-    assert list(data["report"]["pace"]) == [FROZEN, TUNED, SCRATCH]
+    assert list(data["report"]["pace"]) == [FROZEN, ASSISTED, TUNED, SCRATCH]
     assert data["report"]["pace"][SCRATCH] == [
-        {"seconds": 1.0, "seeds": {"0": {"n": 7}}},
-        {"seconds": 2.0, "seeds": {"0": {"n": 4}}},
+        {"seconds": 1.0, "seeds": {"0": {"n": 9}}},
+        {"seconds": 2.0, "seeds": {"0": {"n": 5}}},
     ]
 
 

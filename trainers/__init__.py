@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from trainers.learner import Learner
     from trainers.losses import MultiTaskLoss
     from trainers.metrics import offline_metrics
-    from trainers.new_task import learn_task
+    from trainers.new_task import closest_task, learn_task
     from trainers.phase import PhaseConfig, PhaseEstimator, phase_errors, train_phase
     from trainers.policy import MultiHeadPolicy
     from trainers.pretrained import load_pretrained
@@ -55,6 +55,7 @@ _HOME = {
     "PhaseEstimator": "phase",
     "ShardMismatchError": "collection",
     "TensorBatches": "batches",
+    "closest_task": "new_task",
     "collect": "collection",
     "collect_all": "collection",
     "evaluate": "evaluation",
@@ -104,6 +105,7 @@ __all__ = [
     "PhaseEstimator",
     "ShardMismatchError",
     "TensorBatches",
+    "closest_task",
     "collect",
     "collect_all",
     "evaluate",

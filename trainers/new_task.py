@@ -14,14 +14,14 @@ from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import one_of
 from trainers.bc import BCConfig, BCHistory, train_bc
 from trainers.dataset import Demonstrations
-from trainers.metrics import BATCH
+from trainers.metrics import BATCH, offline_metrics
 from trainers.policy import MultiHeadPolicy
 
 CRITIC_INPUT = "critic.0.weight"
 """Weights of the critic's first layer, shape (units, D): the one-hot task id is its last columns."""
 
 
-def add_task(policy: MultiHeadPolicy, name: str, seed: int = 0) -> MultiHeadPolicy:
+def add_task(policy: MultiHeadPolicy, name: str, seed: int = 0, like: str | None = None) -> MultiHeadPolicy:
     """A copy of a policy with one more task; see `trainers.MultiHeadPolicy.add_task`."""
     tasks = tasks_of(policy)
     if policy.pooled:
@@ -40,6 +40,9 @@ def add_task(policy: MultiHeadPolicy, name: str, seed: int = 0) -> MultiHeadPoli
     kept = policy.state_dict()
     kept[CRITIC_INPUT] = nn.functional.pad(kept[CRITIC_INPUT], (0, 1))
     grown.load_state_dict(grown.state_dict() | kept)
+    if like is not None:
+        own = policy.actor.heads[tasks.index(one_of(like, tasks, "like"))]
+        grown.actor.heads[-1].load_state_dict(own.state_dict())
     grown.seed = None  # no seed gives these weights
     grown.set_training_mode(policy.training)
     return grown
@@ -91,6 +94,27 @@ def learn_task(
     rows = Demonstrations.concatenate([dataset.with_tasks(tasks), rehearsal.with_tasks(tasks)])
     own = None if validation is None else validation.with_tasks(tasks)
     return train_bc(policy, rows, config, own, **more)
+
+
+def closest_task(policy: MultiHeadPolicy, dataset: Demonstrations) -> str:
+    """The task of a policy whose head, asked for the actions of another task, errs least: a start for a new head.
+
+    Args:
+        policy: a trained one.
+        dataset: rows of the other task; their task id does not matter.
+
+    Raises:
+        InvalidInputError: if there are no rows, or their observations do not fit the policy's.
+    """
+    tasks, (seen, _) = tasks_of(policy), np.split(dataset.obs, [-len(dataset.tasks)], axis=1)
+    errors = {}
+    for name in tasks:
+        as_if = np.tile(np.eye(len(tasks), dtype=np.float32)[tasks.index(name)], (len(seen), 1))
+        rows = dataclasses.replace(dataset, obs=np.hstack([seen, as_if]), tasks=tasks)
+        errors |= {own: scores["mse"] for own, scores in offline_metrics(policy, rows).items()}
+    if not errors:
+        raise InvalidInputError("rows of the new task were expected, got none")
+    return min(errors, key=errors.__getitem__)
 
 
 def tasks_of(policy: Any) -> tuple[str, ...]:

@@ -36,7 +36,7 @@ class NewGaitsConfig:
             positive.
     """
 
-    job: JobConfig = JobConfig(n_envs=1, clone_steps=3000, held_out_s=60.0)
+    job: JobConfig = JobConfig(n_envs=1, clone_steps=3000, batch_size=512)
     seconds: tuple[float, ...] = (15.0, 30.0, 60.0, 120.0, 240.0)
     seeds: tuple[int, ...] = (0, 1, 2)
     rehearsal_s: float = 60.0

@@ -2,12 +2,13 @@
 
 import dataclasses
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from main_job.config import NOISE_RAD, JobConfig
+from main_job.config import NOISE_RAD, ROUND_NOISE_RAD, JobConfig
 from main_job.students import new_policy
 from student_report.lab import EXPERT, Walker, summary
 from student_report.lessons import kept_policy, rows_of
@@ -17,9 +18,12 @@ from gait_report.config import NewGaitsConfig, demonstrations, held_out
 from trainers.environments import derive_seed
 from trainers.new_task import tasks_of
 
-FROZEN, TUNED, SCRATCH = "new head, frozen trunk", "fine-tuned with rehearsal", "from scratch"
-METHODS = (FROZEN, TUNED, SCRATCH)
-"""Everything that is compared."""
+FROZEN, ASSISTED = "new head, frozen trunk", "new head, half by safe DAgger"
+TUNED, SCRATCH = "fine-tuned with rehearsal", "from scratch"
+METHODS = (FROZEN, ASSISTED, TUNED, SCRATCH)
+"""Everything that is compared. All get labels for equally many seconds and take equally many gradient steps."""
+TAKEOVER_RAD = 0.1
+"""Of the DAgger round, see `trainers.DAggerConfig`."""
 BEFORE = "before"
 """The trained policy in its own gaits, which are compared with what tuning makes of them."""
 SINGLE_ROWS = 200
@@ -76,22 +80,54 @@ class Lesson:
 
     def _taught(self) -> trainers.MultiHeadPolicy:
         job = self._job(self.seed)
-        rows = rows_of(demonstrations(job, self.seconds), self.folder)
+        shown, asked = halves(self.seconds, job.shard_s) if self.method == ASSISTED else (self.seconds, 0.0)
+        rows = rows_of(demonstrations(job, shown), self.folder)
         if self.method == SCRATCH:
             policy = new_policy(job, job.env_kwargs)
             trainers.train_bc(policy, rows, job.bc)
             return policy
         base = self.base.load()
-        policy = base.add_task(self.gait, self.seed)
-        if self.method == FROZEN:
-            trainers.learn_task(policy, rows, job.bc)
-        else:
-            tuning = dataclasses.replace(job.bc, learning_rate=self.config.tuning_rate)
-            trainers.learn_task(policy, rows, tuning, rehearsal=rehearsal(base, self.config, self.folder))
+        if asked:
+            rows = self._with_round(self._headed(base, rows, job.bc), rows, asked)
+        if self.method != TUNED:
+            return self._headed(base, rows, job.bc)
+        tuning = dataclasses.replace(job.bc, learning_rate=self.config.tuning_rate)
+        return self._headed(base, rows, tuning, rehearsal(base, self.config, self.folder))
+
+    def _headed(
+        self,
+        base: trainers.MultiHeadPolicy,
+        rows: trainers.Demonstrations,
+        bc: trainers.BCConfig,
+        rehearsed: trainers.Demonstrations | None = None,
+    ) -> trainers.MultiHeadPolicy:
+        """The trained policy with a head that began as the closest of its own and has learned."""
+        policy = base.add_task(self.gait, self.seed, like=trainers.closest_task(base, rows))
+        trainers.learn_task(policy, rows, bc, rehearsal=rehearsed)
         return policy
+
+    def _with_round(
+        self, policy: trainers.MultiHeadPolicy, rows: trainers.Demonstrations, seconds: float
+    ) -> trainers.Demonstrations:
+        """The rows, and those of a round in which the policy drives until the expert takes over [s]."""
+        job, tasks = self._job(self.seed), tasks_of(policy)
+        asked = trainers.DAggerConfig(seconds, beta=0.0, takeover_rad=TAKEOVER_RAD, seed=self.seed)
+        env_kwargs = job.env_kwargs | {"tasks": tasks} | job.world
+        venv = trainers.make_venv((self.gait,), 1, env_kwargs, job.disturbed(ROUND_NOISE_RAD))
+        with closing(venv):
+            rounds = self.folder / "rounds" / f"{self.gait}-{self.seconds:g}-{self.seed}"
+            trainer = trainers.DAggerTrainer(venv, policy, rows.with_tasks(tasks), asked, job.bc, scratch_dir=rounds)
+            trainer.collect_round()
+            return trainer.rows
 
     def _job(self, seed: int) -> JobConfig:
         return self.config.job_of(self.base.load(), (self.gait,), seed)
+
+
+def halves(seconds: float, shard_s: float) -> tuple[float, float]:
+    """Seconds of demonstrations, in whole shards and one at least, and of the DAgger round after them [s]."""
+    shown = max(1, round(seconds / shard_s) // 2) * shard_s
+    return shown, seconds - shown
 
 
 def rehearsal(base: Any, config: NewGaitsConfig, folder: Path) -> trainers.Demonstrations:

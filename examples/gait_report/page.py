@@ -9,11 +9,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from student_report.lab import EXPERT
 
-from gait_report.methods import BEFORE, FROZEN, SCRATCH, TUNED
+from gait_report.methods import BEFORE, METHODS
 from trainers.metrics import wilson_interval
 from trainers.report import markdown, number
 
-COLOURS = dict(zip((FROZEN, TUNED, SCRATCH), ("#2166ac", "#1b9e77", "#d6604d"), strict=True))
+COLOURS = dict(zip(METHODS, ("#2166ac", "#7570b3", "#1b9e77", "#d6604d"), strict=True))
 """Of the methods."""
 NOTE = (
     "Success (survival) and R2 on held-out rows by seconds of demonstrations, all training seeds together; the "

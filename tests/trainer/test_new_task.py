@@ -15,6 +15,7 @@ from trainers import (
     Demonstrations,
     MultiHeadPolicy,
     PhaseEstimator,
+    closest_task,
     collect,
     learn_task,
     load,
@@ -100,6 +101,27 @@ def test_the_new_head_is_near_the_mean_action_and_fixed_by_its_seed(trained):
     }
     means = first.mean_actions(torch.from_numpy(observations([4], 5)))
     assert (means - trained.act_normalizer.shift).abs().max() < 0.02
+
+
+def test_a_new_head_can_begin_as_a_copy(trained):
+    grown = trained.add_task("pace", like="jump")
+    obs = observations([2, 4], 5)
+    obs[1, :SIZE] = obs[0, :SIZE]
+    jump, pace = (grown.predict(row, deterministic=True)[0] for row in obs)
+    np.testing.assert_array_equal(pace, jump)
+    torch.nn.init.zeros_(grown.actor.heads[4][-1].weight)
+    np.testing.assert_array_equal(grown.predict(obs[0], deterministic=True)[0], jump, "it is no more than a copy")
+    with pytest.raises(InvalidInputError, match="like must be one of 'trot'.*got 'pace'"):
+        trained.add_task("pace", like="pace")
+
+
+def test_the_closest_task_is_the_one_that_already_does_it(trained, pace):
+    for k, name in enumerate(PAPER_TASKS):
+        as_if = np.tile(np.eye(4, dtype=np.float32)[k], (len(pace), 1))
+        acts = trained.predict(np.hstack([pace.obs[:, :-1], as_if]), deterministic=True)[0]
+        assert closest_task(trained, dataclasses.replace(pace, acts=acts)) == name
+    with pytest.raises(InvalidInputError, match="rows of the new task"):
+        closest_task(trained, pace.take(np.zeros(0, dtype=int)))
 
 
 def test_who_has_it_or_cannot_have_it_is_told(trained, policy):
