@@ -1,5 +1,8 @@
 """New gaits for a trained policy: a head on its frozen trunk, all of it tuned with rehearsal, or a network of its own.
 
+A head learns from demonstrations alone, or from half as many and a round of DAgger in which the expert takes over when
+the student goes astray; all methods get labels for equally many seconds. It takes about two hours of one core.
+
 python examples/new_gaits.py                          pace and gallop for the student that comes with the package
 python examples/new_gaits.py --policy runs/default/policy.zip --gaits gallop             Ctrl-C and it goes on later
 python examples/new_gaits.py --quick --out-dir runs/quick                                a minute's worth
@@ -25,7 +28,7 @@ from student_report.lab import Walker
 
 from go1_mtl_gym import Go1Error
 from go1_mtl_gym.validation import number_in
-from trainers.checkpoint import versions
+from trainers.checkpoint import load, versions
 from trainers.files import write_json
 from trainers.pretrained import FOLDER
 
@@ -41,7 +44,8 @@ def report(options: argparse.Namespace) -> dict[str, Any]:
         Go1Error: if the policy or a gait is not as expected.
     """
     config = QUICK if options.quick else NewGaitsConfig()
-    base = Walker.student("base", _readable(options.policy))
+    load(options.policy)  # whatever is wrong with the file is said before it is read for its digest
+    base = Walker.student("base", options.policy)
     parts = parts_of(base, options.gaits, config, options.seed, options.parts)
     if not all(part.path.is_file() for part in parts):
         prepare(parts, options.n_jobs)
@@ -53,18 +57,6 @@ def report(options: argparse.Namespace) -> dict[str, Any]:
         "versions": versions(),
         "seconds": {"new_gaits": round(sum(result["seconds"] for result in results), 1)},
     }
-
-
-def _readable(path: Path) -> Path:
-    """The path of a policy, if it is one.
-
-    Raises:
-        CheckpointError: otherwise.
-    """
-    from trainers.checkpoint import load
-
-    load(path)
-    return path
 
 
 def parse(arguments: list[str]) -> argparse.Namespace:

@@ -27,7 +27,7 @@ TAKEOVER_RAD = 0.1
 BEFORE = "before"
 """The trained policy in its own gaits, which are compared with what tuning makes of them."""
 SINGLE_ROWS = 200
-"""Observations of the old gaits that are also given to the policies one at a time."""
+"""About so many observations of the old gaits are also given to the policies one at a time."""
 
 
 @dataclass(frozen=True)
@@ -168,7 +168,7 @@ def changes(base: Any, policy: Any, rows: trainers.Demonstrations) -> dict[str, 
     longer = rows.with_tasks(tasks_of(policy))
 
     def acts(who: Any, obs: np.ndarray) -> np.ndarray:
-        single = np.stack([who.predict(row, deterministic=True)[0] for row in obs[:SINGLE_ROWS]])
+        single = np.stack([who.predict(row, deterministic=True)[0] for row in obs[:: max(1, len(obs) // SINGLE_ROWS)]])
         return np.concatenate([who.predict(obs, deterministic=True)[0], single])
 
     before, after = acts(base, rows.obs), acts(policy, longer.obs)
