@@ -205,8 +205,8 @@ def test_a_round_adds_as_many_labels_as_there_were_demonstrations(base, folder, 
 
 
 def test_equal_seeds_teach_equal_students(base, folder, tmp_path):
-    students = [lesson(base, FROZEN, *where).policy() for where in ((folder,), (tmp_path,), (tmp_path, 1))]
-    first, again, other = (own.actor.heads[2][0].weight for own in students)
+    taught = [lesson(base, FROZEN, *where).policy() for where in ((folder,), (tmp_path,), (tmp_path, 1))]
+    first, again, other = (own.actor.heads[2][0].weight for own in taught)
     assert torch.equal(first, again) and not torch.equal(first, other)
 
 
@@ -230,11 +230,9 @@ def test_all_parts_come_once_and_the_longest_lessons_first(base, tmp_path):
 
 def test_another_policy_or_setting_is_another_folder(base, tmp_path):
     part = gait_parts.parts_of(base, ["pace"], TINY, 1, tmp_path)[-1]
-    others = [
-        dataclasses.replace(part, base=dataclasses.replace(base, sha256="0" * 64)),
-        dataclasses.replace(part, section=dataclasses.replace(TINY, rehearsal_s=2.0)),
-    ]
-    assert len({own.shared for own in (part, *others)}) == 3
+    other = dataclasses.replace(part, base=dataclasses.replace(base, sha256="0" * 64))
+    longer = dataclasses.replace(part, section=dataclasses.replace(TINY, rehearsal_s=2.0))
+    assert len({own.shared for own in (part, other, longer)}) == 3
     later = dataclasses.replace(part, seed=2)
     assert later.shared == part.shared and later.path != part.path, "students do not depend on the evaluation"
 
@@ -278,9 +276,10 @@ def test_parts_are_put_in_order(base, tmp_path):
 # -- The command -------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "arguments", ["--gaits trot", "--gaits crawl", "--seed -1", "--n-jobs 0", "--policy nothing.zip"]
-)
+IMPOSSIBLE = ["--gaits trot", "--gaits crawl", "--seed -1", "--n-jobs 0", "--policy nothing.zip"]
+
+
+@pytest.mark.parametrize("arguments", IMPOSSIBLE)
 def test_impossible_commands_are_refused(arguments, tmp_path, capsys):
     where = ["--out-dir", str(tmp_path / "out"), "--parts", str(tmp_path / "parts")]
     assert new_gaits.main([*arguments.split(), *where]) == 2
