@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from trainers.learner import Learner
     from trainers.losses import MultiTaskLoss
     from trainers.metrics import offline_metrics
+    from trainers.new_task import closest_task, learn_task
     from trainers.phase import PhaseConfig, PhaseEstimator, phase_errors, train_phase
     from trainers.policy import MultiHeadPolicy
     from trainers.pretrained import load_pretrained
@@ -54,11 +55,13 @@ _HOME = {
     "PhaseEstimator": "phase",
     "ShardMismatchError": "collection",
     "TensorBatches": "batches",
+    "closest_task": "new_task",
     "collect": "collection",
     "collect_all": "collection",
     "evaluate": "evaluation",
     "evaluate_switch": "switching",
     "joint_target_figure": "figures",
+    "learn_task": "new_task",
     "learn_without_clock": "clockless",
     "load": "checkpoint",
     "load_pretrained": "pretrained",
@@ -102,11 +105,13 @@ __all__ = [
     "PhaseEstimator",
     "ShardMismatchError",
     "TensorBatches",
+    "closest_task",
     "collect",
     "collect_all",
     "evaluate",
     "evaluate_switch",
     "joint_target_figure",
+    "learn_task",
     "learn_without_clock",
     "load",
     "load_pretrained",

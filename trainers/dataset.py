@@ -140,6 +140,23 @@ class Demonstrations:
             raise InvalidInputError(f"columns must end in the task id's, {size - k} ... {size - 1}, got {columns[-k:]}")
         return dataclasses.replace(self, obs=self.obs[:, columns])
 
+    def with_tasks(self, tasks: Sequence[str]) -> "Demonstrations":
+        """The same rows with the one-hot task id of other tasks.
+
+        Args:
+            tasks: different names in one-hot order, those of all rows among them.
+
+        Raises:
+            InvalidInputError: if a name comes twice, or that of a row is missing.
+        """
+        tasks, own = tuple(tasks), self.task
+        present = [name for k, name in enumerate(self.tasks) if (own == k).any()]
+        if len(set(tasks)) != len(tasks) or not set(present) <= set(tasks):
+            raise InvalidInputError(f"tasks must differ from each other and hold {present}, got {tasks}")
+        place = np.array([tasks.index(name) if name in tasks else 0 for name in self.tasks])
+        task_id = np.eye(len(tasks), dtype=np.float32)[place[own]]
+        return dataclasses.replace(self, obs=np.hstack([self.obs[:, : -len(self.tasks)], task_id]), tasks=tasks)
+
     def split(self, fraction: float, seed: int) -> tuple["Demonstrations", "Demonstrations"]:
         """Training and held-out rows; whole episodes are held out, at least one per task.
 

@@ -145,6 +145,27 @@ class MultiHeadPolicy(ActorCriticPolicy):
         self.obs_normalizer.set(*norm.fit(obs[:, : -self.n_tasks], self.normalization, binary))
         self.act_normalizer.set(*norm.fit(acts, self.normalization, np.zeros(acts.shape[1], dtype=bool)))
 
+    def add_task(self, name: str, seed: int = 0, like: str | None = None) -> "MultiHeadPolicy":
+        """A new policy that knows one task more, the last in its task id; this one stays as it is.
+
+        Its space of observations is one entry longer, so whoever holds this policy and its spaces must take the new one
+        instead. Trunk, heads, normalisation, critic and exploration noise are copies: in the old tasks it acts as this
+        one does, to the bit. The new head is untrained (see `trainers.learn_task`), and the critic does not see the new
+        task's entry yet.
+
+        Args:
+            name: of a registered task that this policy does not have.
+            seed: of the new head's weights.
+            like: name of a task of this policy whose head the new one begins as a copy of (see
+                `trainers.closest_task`); None draws its weights.
+
+        Raises:
+            InvalidInputError: if the task is unknown or there already, `like` is not there, or this policy is pooled.
+        """
+        from trainers.new_task import add_task
+
+        return add_task(self, name, seed, like)
+
     # -- The actor -----------------------------------------------------------------------------------------------------
 
     def task_index(self, obs: torch.Tensor) -> torch.Tensor:
