@@ -22,7 +22,7 @@ from expert_report.figures import save_figure
 from gait_report.config import QUICK, NewGaitsConfig
 from gait_report.page import new_gaits_figure, new_gaits_table
 from gait_report.parts import assembled, parts_of, prepare
-from publish_results import without_out
+from publishing.runs import without_out
 from report_parts import measure_all
 from student_report.lab import Walker
 

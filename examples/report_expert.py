@@ -20,7 +20,7 @@ from expert_report.bars import compare
 from expert_report.figures import save_figures
 from expert_report.page import card_table, totals_text
 from expert_report.parts import QUICK, SECTIONS, Part, Section
-from publish_results import without_out
+from publishing.runs import without_out
 from report_parts import measure_all
 
 from go1_mtl_gym import TASKS, Go1Error

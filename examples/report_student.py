@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from expert_report.figures import save_figure
-from publish_results import without_out
+from publishing.runs import without_out
 from report_parts import measure_all
 from student_report.classes import changed
 from student_report.figures import FIGURES

@@ -28,7 +28,7 @@ from paper_report.figures import contact_figure, loss_figure
 from paper_report.page import paper_page, score_table
 from paper_report.published import KINDS, MULTI_HEAD
 from paper_report.students import School, students, teach_all
-from publish_results import read_json, without_out
+from publishing.runs import read_json, without_out
 
 import trainers
 from go1_mtl_gym import Go1Error

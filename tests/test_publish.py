@@ -12,6 +12,9 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "examples"))
 
 import publish_results as publish  # noqa: E402
+from publishing import runs  # noqa: E402
+
+from tests.test_new_gaits_page import DATA as NEW_GAITS  # noqa: E402
 
 CLOSED = {
     "survival_rate": 1.0,
@@ -123,6 +126,29 @@ def test_the_report_card_takes_the_scores_place_once_it_is_there(run, root):
     assert publish.main(["--check"], root) == 0
 
 
+def test_benchmarks_new_gaits_and_the_papers_tables_stand_on_the_page_once_they_are_there(run, root):
+    publish.main([str(run)], root)
+    results = root / "docs" / "results"
+    titles = ("## Training against others", "## New gaits for a trained policy", "](paper.md)")
+    page = (results / "README.md").read_text(encoding="utf-8")
+    assert not any(title in page for title in titles)
+    rate = {"samples_per_s": {"median": 200.0, "low": 190.0, "high": 210.0}}
+    rows = [{"setting": "here", "contestant": "ours", "figures": rate, "over": {}}]
+    benchmark = {
+        "sections": {"step": {"meaning": "steps", "rows": rows}},
+        "command": "python b.py --out /home/me/b.json",
+    }
+    (results / "benchmark_training.json").write_text(json.dumps(benchmark))
+    made = {"command": "python examples/new_gaits.py", "seed": 2, "seconds": {"new_gaits": 600.0}}
+    (results / "new_gaits.json").write_text(json.dumps(NEW_GAITS | made))
+    (results / "paper.md").write_text("the paper's tables")
+    assert publish.main([], root) == 0
+    page = (results / "README.md").read_text(encoding="utf-8")
+    assert all(title in page for title in titles)
+    assert "| here | ours | 200 |" in page and "Made by `python b.py`." in page
+    assert "Made by `python examples/new_gaits.py`, seed 2, in 10 min on one core." in page
+
+
 def test_the_students_of_several_seeds_stand_in_the_readme(run, root):
     figures = {"trials": 10, "succeeded": 9, "success_rate": 0.9, "velocity_error": 0.03, "error_ratio": 1.0}
     found = {name: {"trot": {"drawn": figures}} for name in ("seed 0", "seed 1", "expert")}
@@ -200,7 +226,7 @@ def test_a_missing_readme_is_an_error(tmp_path, capsys):
     ],
 )
 def test_the_output_folder_is_cut_from_a_command(options, shown):
-    assert publish.without_out("python examples/dagger.py" + options) == "python examples/dagger.py" + shown
+    assert runs.without_out("python examples/dagger.py" + options) == "python examples/dagger.py" + shown
 
 
 def test_gaits_and_presets_come_from_the_code():

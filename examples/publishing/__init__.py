@@ -1,0 +1,1 @@
+"""What `examples/publish_results.py` writes, and from what."""
