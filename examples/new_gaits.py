@@ -23,10 +23,9 @@ from gait_report.config import QUICK, NewGaitsConfig
 from gait_report.page import new_gaits_figure, new_gaits_table
 from gait_report.parts import assembled, parts_of, prepare
 from publishing.runs import without_out
-from report_parts import measure_all
+from report_parts import exit_status, measure_all
 from student_report.lab import Walker
 
-from go1_mtl_gym import Go1Error
 from go1_mtl_gym.validation import number_in
 from trainers.checkpoint import load, versions
 from trainers.files import write_json
@@ -66,7 +65,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         InvalidInputError: for an impossible number.
     """
     parser = argparse.ArgumentParser(
-        description="Teach a trained policy gaits that it does not know, in three ways, and measure how it walks.",
+        description="Teach a trained policy gaits that it does not know, in several ways, and measure how it walks.",
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
     add = parser.add_argument
@@ -83,19 +82,13 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     return options
 
 
+@exit_status
 def main(arguments: list[str] | None = None) -> int:
     """Run from the command line; returns the exit status."""
     arguments = sys.argv[1:] if arguments is None else arguments
     command = without_out(shlex.join(["python", "examples/new_gaits.py", *arguments]))
-    try:
-        options = parse(arguments)
-        data = report(options) | {"command": command}
-    except Go1Error as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("\ninterrupted; finished parts are kept, the same command goes on from there", file=sys.stderr)
-        return 130
+    options = parse(arguments)
+    data = report(options) | {"command": command}
     path = options.out_dir / "new_gaits.json"
     write_json(path, data)
     picture = save_figure(new_gaits_figure(data), path.with_suffix(".png"))

@@ -21,9 +21,9 @@ from expert_report.figures import save_figures
 from expert_report.page import card_table, totals_text
 from expert_report.parts import QUICK, SECTIONS, Part, Section
 from publishing.runs import without_out
-from report_parts import measure_all
+from report_parts import exit_status, measure_all
 
-from go1_mtl_gym import TASKS, Go1Error
+from go1_mtl_gym import TASKS
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import number_in
 from trainers.checkpoint import versions
@@ -136,18 +136,12 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     return options
 
 
+@exit_status
 def main(arguments: list[str] | None = None) -> int:
     """Run from the command line; returns the exit status."""
     arguments = sys.argv[1:] if arguments is None else arguments
-    try:
-        options = parse(arguments)
-        scores = report(options)
-    except Go1Error as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("\ninterrupted; finished parts are kept, the same command goes on from there", file=sys.stderr)
-        return 130
+    options = parse(arguments)
+    scores = report(options)
     scores["command"] = without_out(shlex.join(["python", "examples/report_expert.py", *arguments]))
     write_json(options.out, scores)
     pictures = save_figures(scores, options.out.parent)

@@ -1,7 +1,9 @@
 """Finished parts of a report on disk, so that Ctrl-C costs little: named by what made them, measured side by side."""
 
+import functools
 import hashlib
 import json
+import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from operator import methodcaller
@@ -13,6 +15,7 @@ import joblib
 from threadpoolctl import threadpool_limits
 from tqdm.auto import tqdm
 
+from go1_mtl_gym import Go1Error
 from trainers.files import json_ready, write_json
 
 
@@ -74,3 +77,20 @@ def _shown(bar: tqdm, part: dict[str, Any]) -> dict[str, Any]:
     bar.set_postfix_str(" ".join(part[name] for name in ("section", "task", "what") if name in part))
     bar.update()
     return part
+
+
+def exit_status(main: Callable[[list[str] | None], int]) -> Callable[[list[str] | None], int]:
+    """A report's command that ends with a status: 2 and one line for bad input, 130 for Ctrl-C."""
+
+    @functools.wraps(main)
+    def run(arguments: list[str] | None = None) -> int:
+        try:
+            return main(arguments)
+        except Go1Error as error:
+            print(f"error: {error}", file=sys.stderr)
+            return 2
+        except KeyboardInterrupt:
+            print("\ninterrupted; finished parts are kept, the same command goes on from there", file=sys.stderr)
+            return 130
+
+    return run

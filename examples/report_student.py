@@ -23,7 +23,7 @@ from typing import Any
 
 from expert_report.figures import save_figure
 from publishing.runs import without_out
-from report_parts import measure_all
+from report_parts import exit_status, measure_all
 from student_report.classes import changed
 from student_report.figures import FIGURES
 from student_report.lab import Walker, walkers
@@ -32,7 +32,6 @@ from student_report.page import CHAPTERS
 from student_report.parts import SECTIONS, Section, parts_of
 from student_report.school import teach_all
 
-from go1_mtl_gym import Go1Error
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import number_in, one_of
 from trainers.checkpoint import versions
@@ -171,25 +170,19 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     return options
 
 
+@exit_status
 def main(arguments: list[str] | None = None) -> int:
     """Run from the command line; returns the exit status."""
     arguments = sys.argv[1:] if arguments is None else arguments
     command = without_out(shlex.join(["python", "examples/report_student.py", *arguments]))
-    try:
-        options = parse(arguments)
-        given = walkers(options.policy) if options.policy else []
-        for name, pairs in plan(options, {name: gaits(name, given, options) for name in options.sections}).items():
-            data = report(name, pairs, given, options) | {"command": command}
-            path = options.out_dir / f"student_{name}.json"
-            write_json(path, data)
-            picture = save_figure(FIGURES[name](data["report"]), path.with_suffix(".png"))
-            print(f"\n{CHAPTERS[name].table(data['report'])}\n\n{name}: {path}\npicture: {picture}")
-    except Go1Error as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("\ninterrupted; finished parts are kept, the same command goes on from there", file=sys.stderr)
-        return 130
+    options = parse(arguments)
+    given = walkers(options.policy) if options.policy else []
+    for name, pairs in plan(options, {name: gaits(name, given, options) for name in options.sections}).items():
+        data = report(name, pairs, given, options) | {"command": command}
+        path = options.out_dir / f"student_{name}.json"
+        write_json(path, data)
+        picture = save_figure(FIGURES[name](data["report"]), path.with_suffix(".png"))
+        print(f"\n{CHAPTERS[name].table(data['report'])}\n\n{name}: {path}\npicture: {picture}")
     return 0
 
 

@@ -29,9 +29,9 @@ from paper_report.page import paper_page, score_table
 from paper_report.published import KINDS, MULTI_HEAD
 from paper_report.students import School, students, teach_all
 from publishing.runs import read_json, without_out
+from report_parts import exit_status
 
 import trainers
-from go1_mtl_gym import Go1Error
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import number_in
 from trainers.checkpoint import versions
@@ -132,25 +132,19 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     return options
 
 
+@exit_status
 def main(arguments: list[str] | None = None) -> int:
     """Run from the command line; returns the exit status."""
     arguments = sys.argv[1:] if arguments is None else arguments
     command = without_out(shlex.join(["python", "examples/reproduce_paper.py", *arguments]))
-    try:
-        options = parse(arguments)
-        config = settings(options)
-        for name in options.tables:
-            found, school = reproduce(name, config, options)
-            pictures = save_figures(name, found, school, options.out_dir)
-            path = write_table(name, found | {"command": command}, options.out_dir)
-            table = score_table(school.table.published, found["students"], school.data.tests[0], paper=True)
-            print(f"\n{table}\n\n{name}: {path}", *(f"picture: {picture}" for picture in pictures), sep="\n")
-    except Go1Error as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print("\ninterrupted; finished parts are kept, the same command goes on from there", file=sys.stderr)
-        return 130
+    options = parse(arguments)
+    config = settings(options)
+    for name in options.tables:
+        found, school = reproduce(name, config, options)
+        pictures = save_figures(name, found, school, options.out_dir)
+        path = write_table(name, found | {"command": command}, options.out_dir)
+        table = score_table(school.table.published, found["students"], school.data.tests[0], paper=True)
+        print(f"\n{table}\n\n{name}: {path}", *(f"picture: {picture}" for picture in pictures), sep="\n")
     return 0
 
 
