@@ -22,7 +22,7 @@ from typing import Any
 
 from expert_report.figures import save_figure
 from main_job.students import check_device
-from paper_report.config import FULL, QUICK, TABLES, PaperConfig
+from paper_report.config import FULL, PRECISIONS, QUICK, TABLES, PaperConfig
 from paper_report.data import TRAIN, collect, shard_jobs
 from paper_report.figures import contact_figure, loss_figure
 from paper_report.page import paper_page, score_table
@@ -93,7 +93,7 @@ def write_table(name: str, found: dict[str, Any], folder: Path) -> Path:
 
 def settings(options: argparse.Namespace) -> PaperConfig:
     """How much is made: the full or the quick settings, with what the command line says otherwise."""
-    names = ("widths", "seeds", "steps", "seed")
+    names = ("widths", "seeds", "steps", "batch_size", "precision", "seed")
     given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
     lists = {name: tuple(value) for name, value in given.items() if isinstance(value, list)}
     return dataclasses.replace(QUICK if options.quick else FULL, **given | lists)
@@ -115,6 +115,8 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     add("--widths", type=int, nargs="+", default=None, help=f"units per hidden layer; None: {FULL.widths}")
     add("--seeds", type=int, nargs="+", default=None, help=f"of the trainings; None: {FULL.seeds}")
     add("--steps", type=int, default=None, help=f"gradient steps of every training; None: {FULL.steps}")
+    add("--batch-size", type=int, default=None, help=f"rows per step; None: {FULL.batch_size}")
+    add("--precision", choices=tuple(PRECISIONS), default=None, help=f"of the trainings; None: {FULL.precision}")
     add("--seed", type=int, default=None, help=f"of commands and episodes; None: {FULL.seed}")
     add("--device", default="cpu", help="of the trainings: cpu or cuda")
     add("--n-jobs", type=int, default=os.cpu_count() or 1, help="processes, each of which makes a shard or a student")

@@ -20,7 +20,9 @@ from paper_report import page as paper_page  # noqa: E402
 from paper_report import sums as paper_sums  # noqa: E402
 
 
-def student(kind="multi_head", width=512, seed=0, r2=0.99, mse=0.001, gait=None, use="named", steps=100):
+def student(
+    kind="multi_head", width=512, seed=0, r2=0.99, mse=0.001, gait=None, use="named", steps=100, precision="bfloat16"
+):
     """What is known of a student of trot and bound; bound's R2 is 0.001 lower."""
     gaits = [gait] if gait else ["trot", "bound"]
     figures = {"mse": mse, "mae": 10 * mse}
@@ -29,6 +31,7 @@ def student(kind="multi_head", width=512, seed=0, r2=0.99, mse=0.001, gait=None,
         "kind": kind,
         "width": width,
         "seed": seed,
+        "precision": precision,
         "gait": gait,
         "steps": steps,
         "scores": {use: scores},
@@ -53,19 +56,20 @@ def test_intervals_are_students_t():
 
 def test_students_of_one_width_and_duration_are_one_learner():
     own = [student(seed=0, r2=0.98), student(seed=1, r2=0.99), student(width=2560), student(steps=7)]
+    own += [student(precision="float32")]
     own += [student("per_gait", gait="trot", seed=s) for s in (0, 1, 2)] + [student("pooled")]
-    names = [(learner.width, learner.steps, learner.kind) for learner in paper_sums.learners(own)]
-    assert names == [
-        (512, 7, "multi_head"),
-        (512, 100, "multi_head"),
-        (512, 100, "pooled"),
-        (512, 100, "per_gait"),
-        (2560, 100, "multi_head"),
+    assert [learner[:3] + (learner.kind,) for learner in paper_sums.learners(own)] == [
+        (512, 7, "bfloat16", "multi_head"),
+        (512, 100, "bfloat16", "multi_head"),
+        (512, 100, "bfloat16", "pooled"),
+        (512, 100, "bfloat16", "per_gait"),
+        (512, 100, "float32", "multi_head"),
+        (2560, 100, "bfloat16", "multi_head"),
     ]
     trot, bound = (paper_sums.scores(own, gait, "named") for gait in ("trot", "bound"))
-    assert [each["r2"].count for each in trot.values()] == [1, 2, 1, 3, 1]
-    assert [learner.kind for learner in bound] == ["multi_head", "multi_head", "pooled", "multi_head"]
-    assert trot[paper_sums.Learner(512, 100, 0)]["r2"].mean == pytest.approx(0.985)
+    assert [each["r2"].count for each in trot.values()] == [1, 2, 1, 3, 1, 1]
+    assert [learner.kind for learner in bound] == [*["multi_head"] * 2, "pooled", *["multi_head"] * 2]
+    assert trot[paper_sums.Learner(512, 100, "bfloat16", 0)]["r2"].mean == pytest.approx(0.985)
     assert paper_sums.scores(own, "trot", "unseen") == {}
 
 
@@ -78,8 +82,9 @@ def test_a_verdict_needs_more_than_the_aim_and_every_figure():
     assert paper_sums.verdicts("simulation", own[:1])[0]["worse"] is None
     better = [student(mse=0.0009, r2=0.995), student("pooled", r2=0.9905, mse=0.001)]
     assert [each["worse"] for each in paper_sums.verdicts("simulation", better)] == [[], []]
-    wide = [student(width=2560), student("pooled", width=512)]
-    assert all(each["worse"] is None for each in paper_sums.verdicts("simulation", wide))
+    for other in ({"width": 2560}, {"steps": 7}, {"precision": "float32"}):
+        apart = paper_sums.verdicts("simulation", [student(**other), student("pooled")])
+        assert apart and all(each["worse"] is None for each in apart)
 
 
 # -- Page and figures --------------------------------------------------------------------------------------------------
@@ -88,9 +93,9 @@ def test_a_verdict_needs_more_than_the_aim_and_every_figure():
 def test_scores_stand_beside_the_papers():
     own = [student(seed=seed, r2=0.99 + 0.001 * seed) for seed in (0, 1, 2)]
     lines = paper_page.score_table("simulation", own, "named", paper=True).splitlines()
-    assert lines[2].startswith("| trot | paper, multi-task | 2560 | - | - | 0.000528 | 0.01764 | 0.91954 | - |")
+    assert lines[2].startswith("| trot | paper, multi-task | - | 2560 | - | - | 0.000528 | 0.01764 | 0.91954 | - |")
     # s = 0.001, n = 3: half width 4.303 * 0.001 / sqrt(3).
-    assert "| trot | multi-head | 512 | 100 | 3 | 0.001000 ± 0.000000 |" in lines[4]
+    assert "| trot | multi-head | bfloat16 | 512 | 100 | 3 | 0.001000 ± 0.000000 |" in lines[4]
     assert lines[4].endswith("| 0.99100 ± 0.00248 | 0.98100 ± 0.00248 |")
     assert len(lines) == 2 + 3 * 2 + 2  # jump is not measured, so it has the paper's rows alone
     assert "paper" not in paper_page.score_table("simulation", own, "named", paper=False)

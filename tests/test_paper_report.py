@@ -91,6 +91,7 @@ def test_a_table_goes_to_other_processes_and_its_shards_are_known_again(table):
         {"span": (0.8, 0.0)},
         {"gap": -0.1},
         {"space": "degrees"},
+        {"precision": "float16"},
         {"curve_rows": 0},
     ],
 )
@@ -113,6 +114,15 @@ def test_a_network_of_one_gait_draws_as_many_of_its_rows():
     config = dataclasses.replace(paper_config.FULL, batch_size=900, steps=400, curve_points=40)
     assert [config.bc(3, share).batch_size for share in (1.0, 1 / 3)] == [900, 300]
     assert config.bc(3, 1.0).log_interval == 10 and config.bc(3, 1.0).seed == 3
+
+
+def test_precisions_are_told_apart():
+    asked = [dataclasses.replace(paper_config.FULL, precision=name).bc(0, 1.0) for name in paper_config.PRECISIONS]
+    assert [(own.matmul_precision, own.autocast) for own in asked] == [
+        ("highest", False),
+        ("medium", False),
+        ("highest", True),
+    ]
 
 
 def test_commands_are_drawn_within_what_the_expert_survives(passing_tasks):
@@ -236,6 +246,7 @@ def test_a_quick_run_writes_both_tables_and_adds_to_them(tmp_path, monkeypatch, 
         (["simulation", "--seeds", "1", "1"], "different"),
         (["simulation", "--widths", "0"], "widths"),
         (["simulation", "--steps", "0"], "steps"),
+        (["simulation", "--batch-size", "0"], "batch_size"),
         (["simulation", "--device", "tpu"], "device"),
         (["simulation", "--threads", "0"], "threads"),
     ],

@@ -40,17 +40,20 @@ def test_every_network_is_asked_for_once():
     assert {each.gait for each in own if each.kind == "per_gait"} == {"trot", "bound"}
 
 
-@pytest.mark.parametrize("change", [{"kind": "a"}, {"gait": "trot"}, {"kind": "per_gait"}, {"width": 0}, {"seed": -1}])
+@pytest.mark.parametrize(
+    "change",
+    [{"kind": "a"}, {"gait": "trot"}, {"kind": "per_gait"}, {"width": 0}, {"seed": -1}, {"precision": "a"}],
+)
 def test_impossible_students_are_refused(change):
     with pytest.raises(InvalidInputError):
-        paper_students.Student(**({"kind": "pooled", "width": 8, "seed": 0} | change))
+        paper_students.Student(**({"kind": "pooled", "width": 8, "seed": 0, "precision": "float32"} | change))
 
 
 def test_a_folder_is_named_by_what_makes_its_students(data):
     def folder(**change):
         return paper_students.School(TABLE, dataclasses.replace(TINY, **change), data).folder
 
-    for unused in ({"steps": 5}, {"seeds": (7,)}, {"widths": (9,)}, {"curve_points": 1}):
+    for unused in ({"steps": 5}, {"seeds": (7,)}, {"widths": (9,)}, {"curve_points": 1}, {"precision": "float32"}):
         assert folder(**unused) == folder()
     used = ({"batch_size": 32}, {"learning_rate": 1e-3}, {"normalization": "none"}, {"space": "normalized"})
     assert len({folder(), *(folder(**own) for own in used)}) == 5
@@ -79,7 +82,8 @@ def school(data):
 
 def test_a_student_is_measured_on_what_was_held_out(school, data):
     for own in school.finished(("multi_head", "pooled", "per_gait")):
-        path = school.file(paper_students.Student(own["kind"], own["width"], own["seed"], own["gait"]))
+        known = {each.name: own[each.name] for each in dataclasses.fields(paper_students.Student)}
+        path = school.file(paper_students.Student(**known))
         policy = trainers.load(path.with_suffix(".zip"))
         rows = paper_students.thinned(data.rows("unseen"), 10**6)
         found = trainers.offline_metrics(policy, rows)
@@ -104,7 +108,8 @@ def test_the_curve_ends_at_the_error_of_the_finished_student(school, data):
 
 def test_networks_of_one_gait_learn_nothing_of_the_other(school):
     trot = next(own for own in school.finished(("per_gait",)) if own["gait"] == "trot")
-    policy = trainers.load(school.file(paper_students.Student("per_gait", 8, 1, "trot")).with_suffix(".zip"))
+    student = paper_students.Student("per_gait", 8, 1, "bfloat16", "trot")
+    policy = trainers.load(school.file(student).with_suffix(".zip"))
     rows = school.data.rows("train").per_task()
     low, high = rows["trot"].acts.min(0), rows["trot"].acts.max(0)
     np.testing.assert_allclose(policy.act_normalizer.shift.numpy(), (low + high) / 2, atol=1e-6)
@@ -115,9 +120,9 @@ def test_students_are_taught_once_and_wider_ones_are_added(school, monkeypatch):
     kept = {path: path.stat().st_mtime_ns for path in school.folder.iterdir()}
     wider = dataclasses.replace(school, config=dataclasses.replace(TINY, widths=(8, 12), seeds=(1,), steps=4))
     assert wider.folder == school.folder
-    paper_students.teach_all(wider, [paper_students.Student("pooled", 12, 1)], 1)
+    paper_students.teach_all(wider, [paper_students.Student("pooled", 12, 1, "bfloat16")], 1)
     monkeypatch.setattr(trainers, "train_bc", None)
-    paper_students.teach_all(school, [paper_students.Student("pooled", 8, 1)], 1)
+    paper_students.teach_all(school, [paper_students.Student("pooled", 8, 1, "bfloat16")], 1)
     assert kept == {path: path.stat().st_mtime_ns for path in kept}
     assert [(own["width"], own["steps"]) for own in school.finished(("pooled",))] == [(8, 12), (12, 4)]
     assert school.widest("pooled").width == 12 and school.widest("multi_head").width == 8
@@ -127,7 +132,7 @@ def test_students_are_taught_once_and_wider_ones_are_added(school, monkeypatch):
 def test_students_do_not_depend_on_processes(data):
     own = paper_students.School(TABLE, TINY, data)
     two = dataclasses.replace(own, config=dataclasses.replace(TINY, steps=7))
-    wanted = [paper_students.Student("multi_head", 8, seed) for seed in (0, 1)]
+    wanted = [paper_students.Student("multi_head", 8, seed, "bfloat16") for seed in (0, 1)]
     paper_students.teach_all(two, wanted, 2)
     found = [two.file(each) for each in wanted]
     scores = [json.loads(path.read_text())["scores"] for path in found]

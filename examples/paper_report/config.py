@@ -10,12 +10,17 @@ import numpy as np
 from experts import HARDWARE_LIKE
 from go1_mtl_gym import TASKS, EstimatorNoise
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.validation import finite_vector, number_in
+from go1_mtl_gym.validation import finite_vector, number_in, one_of
 from trainers import BCConfig
 from trainers.collection import EPISODE_S
 
 Command = tuple[float, float, float]
 """(vx [m/s], vy [m/s], yaw rate [rad/s])."""
+PRECISIONS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
+    {"float32": {}, "medium": {"matmul_precision": "medium"}, "bfloat16": {"autocast": True}}
+)
+"""Name -> how `trainers.BCConfig` asks for it. "medium" multiplies matrices in bfloat16 and keeps float32 between them,
+"bfloat16" computes all of the network in it; weights, loss and measurements are float32 in all of them."""
 MOST_COMMANDS = 100
 """Most commands of one use; their seeds stand this far apart."""
 
@@ -99,6 +104,7 @@ class PaperConfig:
         learning_rate: peak of the one-cycle schedule.
         normalization: of inputs and outputs; the paper's is "min_max".
         space: of the loss, see `trainers.BCConfig`.
+        precision: of the trainings, one of `PRECISIONS`.
         curve_points: entries of a curve of the held-out loss.
         curve_rows: held-out rows per gait that such an entry is measured on.
 
@@ -119,12 +125,14 @@ class PaperConfig:
     learning_rate: float = 2e-3
     normalization: str = "min_max"
     space: str = "radians"
+    precision: str = "bfloat16"
     curve_points: int = 40
     curve_rows: int = 3000
 
     def __post_init__(self) -> None:
         for name in ("train_commands", "unseen_commands"):
             number_in(getattr(self, name), 1, MOST_COMMANDS, name)
+        number_in(self.batch_size, max(len(table.gaits) for table in TABLES.values()), 1e7, "batch_size")
         number_in(self.seconds, 0.1, EPISODE_S, "seconds")
         number_in(self.seed, 0, 10_000, "seed")
         for name, high in (("widths", 1e5), ("seeds", 2**31 - 1)):
@@ -137,6 +145,7 @@ class PaperConfig:
             number_in(getattr(self, name), 1, 1e6, name)
         if not (finite_vector(self.span, 2, "span") > 0).all() or not self.gap >= 0:
             raise InvalidInputError(f"span must be positive and gap >= 0, got {self.span} and {self.gap}")
+        one_of(self.precision, tuple(PRECISIONS), "precision")
         self.bc(0, 1.0)
 
     def bc(self, seed: int, share: float) -> BCConfig:
@@ -149,11 +158,12 @@ class PaperConfig:
         """
         return BCConfig(
             steps=self.steps,
-            batch_size=max(1, round(self.batch_size * share)),
+            batch_size=round(self.batch_size * share),
             learning_rate=self.learning_rate,
             space=self.space,
             log_interval=max(1, round(self.steps / self.curve_points)),
             seed=seed,
+            **PRECISIONS[self.precision],
         )
 
     def largest(self, gait: str) -> np.ndarray:

@@ -84,12 +84,13 @@ def score_table(name: str, students: Sequence[Mapping[str, Any]], use: str, pape
     for gait, published in PUBLISHED[name].items():
         for kind, figures in published.items() if paper else ():
             cells = [number(figures.get(key), DIGITS[key]) for key in SHOWN]
-            rows.append([gait, f"paper, {OWN_KINDS[kind]}", "2560", "-", "-", *cells])
+            rows.append([gait, f"paper, {OWN_KINDS[kind]}", "-", "2560", "-", "-", *cells])
         for learner, own in scores(students, gait, use).items():
             cells = [_cell(own[key], DIGITS[key]) for key in SHOWN]
-            about = [str(learner.width), str(learner.steps), str(own["r2"].count)]
+            about = [learner.precision, str(learner.width), str(learner.steps), str(own["r2"].count)]
             rows.append([gait, KINDS[learner.kind], *about, *cells])
-    return markdown(["gait", "learner", "width", "steps", "seeds", *SHOWN.values()], rows, text_columns=2)
+    header = ["gait", "learner", "trained in", "width", "steps", "seeds", *SHOWN.values()]
+    return markdown(header, rows, text_columns=3)
 
 
 def verdict_table(name: str, students: Sequence[Mapping[str, Any]]) -> str:
@@ -100,9 +101,9 @@ def verdict_table(name: str, students: Sequence[Mapping[str, Any]]) -> str:
         better = "-" if own["worse"] is None else _better(own["worse"])
         reached = r2 if own["reached"] else f"**{r2}**"
         about = [str(own["width"]), str(own["steps"]), f"> {own['aim']:g}"]
-        rows.append([own["gait"], USES[own["use"]], *about, reached, better])
-    header = ["gait", "held out", "width", "steps", "aim, R2", "multi-head, R2", "better than pooled in"]
-    return markdown(header, rows, text_columns=2)
+        rows.append([own["gait"], USES[own["use"]], own["precision"], *about, reached, better])
+    header = ["gait", "held out", "trained in", "width", "steps", "aim, R2", "multi-head, R2", "better than pooled in"]
+    return markdown(header, rows, text_columns=3)
 
 
 def account_table(data: Mapping[str, Mapping[str, Mapping[str, float]]]) -> str:
@@ -124,9 +125,11 @@ def training_table(students: Sequence[Mapping[str, Any]]) -> str:
         minutes = sum(each["seconds"] for each in own) / 60
         speeds = [each["samples_per_s"] for each in own]
         about = [str(learner.width), str(learner.steps), str(len(own)), f"{minutes:.1f}"]
-        rows.append([KINDS[learner.kind], "; ".join(devices), *about, f"{sum(speeds) / len(speeds):,.0f}"])
-    header = ["learner", "on", "width", "steps", "networks", "training, all [min]", "rows per second, mean"]
-    return markdown(header, rows, text_columns=2)
+        where = [KINDS[learner.kind], "; ".join(devices), learner.precision]
+        rows.append([*where, *about, f"{sum(speeds) / len(speeds):,.0f}"])
+    times = ["training, all [min]", "rows per second, mean"]
+    header = ["learner", "on", "trained in", "width", "steps", "networks", *times]
+    return markdown(header, rows, text_columns=3)
 
 
 def _cell(value: Estimate, how: str) -> str:
@@ -153,7 +156,8 @@ def differences(name: str, table: Mapping[str, Any]) -> str:
         "Kp in both, so other gains scale them differently.",
         f"Training: AdamW, one-cycle schedule with a peak of {config['learning_rate']:g}, {config['batch_size']} rows "
         f"per step, equally many of every gait, {loss}. Optimiser, rate, batch, duration and seeds of the paper are "
-        "not stated. A network per gait draws as many rows of its gait per step as a network of all gaits does.",
+        "not stated. Where a student was trained in bfloat16, weights, loss and all measurements are float32 still. A "
+        "network per gait draws as many rows of its gait per step as a network of all gaits does.",
         f"Commands: {config['train_commands']} per gait for training, drawn from ± {config['span'][0]:g} m/s forward "
         f"and ± {config['span'][1]:g} m/s sideways, yaw rate 0; the authors' own lists are not published. "
         f"{clipped(table)} Held-out ones are at least {config['gap']:g} m/s from every command of the training.",

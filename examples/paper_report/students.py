@@ -19,13 +19,14 @@ from tqdm.auto import tqdm
 import trainers
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import number_in, one_of
-from paper_report.config import PaperConfig, Table
+from paper_report.config import PRECISIONS, PaperConfig, Table
 from paper_report.data import TRAIN, PaperData
 from paper_report.published import KINDS, PER_GAIT, POOLED
+from paper_report.sums import learner_of
 from trainers.checkpoint import versions
 from trainers.files import write_json
 
-UNUSED = ("steps", "seed", "log_interval")
+UNUSED = ("steps", "seed", "log_interval", "matmul_precision", "autocast")
 """Settings of the cloning that a folder of students is not named by: files are, or they change no student."""
 
 
@@ -37,19 +38,22 @@ class Student:
         kind: one of `KINDS`.
         width: units of every hidden layer.
         seed: of its initial weights and of the order of the rows.
+        precision: of its training, one of `PRECISIONS`.
         gait: the one that it learns, if its kind has a network for every gait.
 
     Raises:
-        InvalidInputError: if there is no such kind, or it is given a gait too many or too few.
+        InvalidInputError: if there is no such kind or precision, or it is given a gait too many or too few.
     """
 
     kind: str
     width: int
     seed: int
+    precision: str
     gait: str | None = None
 
     def __post_init__(self) -> None:
         one_of(self.kind, tuple(KINDS), "kind of student")
+        one_of(self.precision, tuple(PRECISIONS), "precision")
         number_in(self.width, 1, 1e5, "width")
         number_in(self.seed, 0, 2**31 - 1, "training seed")
         if (self.gait is None) == (self.kind == PER_GAIT):
@@ -58,14 +62,15 @@ class Student:
     @property
     def name(self) -> str:
         """Of its files, up to the number of steps."""
-        return "-".join([self.kind, *([self.gait] if self.gait else []), str(self.width), f"seed{self.seed}"])
+        gait = [self.gait] if self.gait else []
+        return "-".join([self.kind, *gait, str(self.width), self.precision, f"seed{self.seed}"])
 
 
 def students(table: Table, kinds: Sequence[str], config: PaperConfig) -> list[Student]:
-    """All students of some kinds, with the widths and seeds of the settings."""
+    """All students of some kinds, with the widths, seeds and precision of the settings."""
     gaits_of = {kind: table.gaits if kind == PER_GAIT else (None,) for kind in kinds}
     return [
-        Student(kind, width, seed, gait)
+        Student(kind, width, seed, config.precision, gait)
         for width in config.widths
         for seed in config.seeds
         for kind in kinds
@@ -128,7 +133,7 @@ class School:
 
     def _lesson(self, student: Student, progress: bool) -> dict[str, Any]:
         share = 1.0 / len(self.table.gaits) if student.gait else 1.0
-        config = self.config.bc(student.seed, share)
+        config = dataclasses.replace(self.config, precision=student.precision).bc(student.seed, share)
         tests = {use: _of(student, self.data.rows(use)) for use in self.data.tests}
         shown = thinned(trainers.Demonstrations.concatenate([*tests.values()]), self.config.curve_rows)
         policy, rows = self.new(student), _of(student, self.data.rows(TRAIN))
@@ -149,10 +154,10 @@ class School:
         }
 
     def finished(self, kinds: Sequence[str]) -> list[dict[str, Any]]:
-        """All students of some kinds that are there, of whatever width, seed and number of steps, in a fixed order."""
+        """All students of some kinds that are there, of whatever width, precision, seed and steps, in a fixed order."""
         found = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(self.folder.glob("*.json"))]
         kept = [own for own in found if own["kind"] in kinds]
-        return sorted(kept, key=lambda own: (own["width"], own["steps"], [*KINDS].index(own["kind"]), own["seed"]))
+        return sorted(kept, key=lambda own: (learner_of(own), own["seed"]))
 
     def widest(self, kind: str) -> trainers.MultiHeadPolicy | None:
         """The finished student of a kind with most units, then steps, then the first seed; None if there is none."""

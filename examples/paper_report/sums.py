@@ -22,17 +22,24 @@ class Learner(NamedTuple):
     Attributes:
         width: units of every hidden layer.
         steps: gradient steps.
+        precision: of the training, one of `paper_report.config.PRECISIONS`.
         rank: place of the kind in `KINDS`.
     """
 
     width: int
     steps: int
+    precision: str
     rank: int
 
     @property
     def kind(self) -> str:
         """Of student, one of `KINDS`."""
         return [*KINDS][self.rank]
+
+
+def learner_of(student: Mapping[str, Any]) -> Learner:
+    """The learner that a student is of, by what is known of it."""
+    return Learner(student["width"], student["steps"], student["precision"], [*KINDS].index(student["kind"]))
 
 
 class Estimate(NamedTuple):
@@ -62,7 +69,7 @@ def learners(students: Iterable[Mapping[str, Any]]) -> dict[Learner, list[Mappin
     """The students of every learner, sorted."""
     found: dict[Learner, list[Mapping[str, Any]]] = {}
     for own in students:
-        found.setdefault(Learner(own["width"], own["steps"], [*KINDS].index(own["kind"])), []).append(own)
+        found.setdefault(learner_of(own), []).append(own)
     return dict(sorted(found.items()))
 
 
@@ -101,9 +108,9 @@ def verdicts(name: str, students: Sequence[Mapping[str, Any]]) -> list[dict[str,
         students: what is known of them.
 
     Returns:
-        One per gait, held-out rows and multi-head learner: "gait", "use", "width", "steps", "aim", "r2" (mean),
-        "reached", and "worse": figures in which pooled students of this width and number of steps are as good or
-        better; None if there are none of these.
+        One per gait, held-out rows and multi-head learner: "gait", "use", "width", "steps", "precision", "aim", "r2"
+        (mean), "reached", and "worse": figures in which pooled students of this width, precision and number of steps
+        are as good or better; None if there are none of these.
     """
     found = []
     for gait, aim in AIMS[name].items():
@@ -120,6 +127,7 @@ def verdicts(name: str, students: Sequence[Mapping[str, Any]]) -> list[dict[str,
                         "use": use,
                         "width": learner.width,
                         "steps": learner.steps,
+                        "precision": learner.precision,
                         "aim": aim,
                         "r2": r2,
                         "reached": r2 > aim,
