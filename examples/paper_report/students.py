@@ -1,6 +1,5 @@
 """The students of a table: trained once, measured on what was held out, and kept on disk."""
 
-import contextlib
 import dataclasses
 import json
 import time
@@ -13,7 +12,7 @@ import numpy as np
 import torch
 from main_job.config import JobConfig
 from main_job.students import new_policy
-from report_parts import digest
+from report_parts import digest, torch_threads
 from tqdm.auto import tqdm
 
 import trainers
@@ -128,7 +127,7 @@ class School:
     def teach(self, student: Student, progress: bool = False) -> None:
         """Train, measure and write a student, unless it is there."""
         if not self.file(student).is_file():
-            with _threads(self.threads):
+            with torch_threads(self.threads):
                 write_json(self.file(student), self._lesson(student, progress))
 
     def _lesson(self, student: Student, progress: bool) -> dict[str, Any]:
@@ -212,14 +211,3 @@ def curve(r2: dict[str, list[float]], rows: trainers.Demonstrations) -> dict[str
 def _of(student: Student, rows: trainers.Demonstrations) -> trainers.Demonstrations:
     """The rows of the gaits that a student learns."""
     return rows.per_task()[student.gait] if student.gait else rows
-
-
-@contextlib.contextmanager
-def _threads(count: int) -> Iterator[None]:
-    """With so many threads in PyTorch."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(count)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)

@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Any, TextIO
 
 import joblib
-import torch
 from main_job.config import JobConfig
-from report_parts import digest
+from report_parts import digest, torch_threads
 from tqdm.auto import tqdm
 
 import trainers
@@ -103,10 +102,5 @@ def _lesson(config: JobConfig, folder: Path) -> dict[str, Any]:
 @contextlib.contextmanager
 def _alone(log: TextIO) -> Iterator[None]:
     """On one thread, and without a word but in `log`."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        with contextlib.redirect_stderr(log), contextlib.redirect_stdout(log):
-            yield
-    finally:
-        torch.set_num_threads(before)
+    with torch_threads(1), contextlib.redirect_stderr(log), contextlib.redirect_stdout(log):
+        yield
