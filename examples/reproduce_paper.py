@@ -42,18 +42,21 @@ PARTS = Path("runs/paper")
 NAME = "paper"
 
 
-def reproduce(name: str, config: PaperConfig, options: argparse.Namespace) -> tuple[dict[str, Any], School]:
+def reproduce(
+    name: str, config: PaperConfig, options: argparse.Namespace, command: str
+) -> tuple[dict[str, Any], School]:
     """Make what is missing of a table; returns what ``paper.json`` holds of it, and its students' files.
 
     Args:
         name: of the table.
         config: how much is made.
         options: of the command line.
+        command: the command line.
     """
     table = TABLES[name]
     wanted = students(table, options.kinds, config)
     data = collect(table, config, options.parts, options.n_jobs)
-    school = School(table, config, data, options.device, options.threads)
+    school = School(table, config, data, options.device, options.threads, command)
     teach_all(school, wanted, options.n_jobs)
     found = {
         "students": school.finished(options.kinds),
@@ -142,9 +145,9 @@ def main(arguments: list[str] | None = None) -> int:
     options = parse(arguments)
     config = settings(options)
     for name in options.tables:
-        found, school = reproduce(name, config, options)
+        found, school = reproduce(name, config, options, command)
         pictures = save_figures(name, found, school, options.out_dir)
-        path = write_table(name, found | {"command": command}, options.out_dir)
+        path = write_table(name, found, options.out_dir)
         table = score_table(school.table.published, found["students"], school.data.tests[0], paper=True)
         print(f"\n{table}\n\n{name}: {path}", *(f"picture: {picture}" for picture in pictures), sep="\n")
     return 0

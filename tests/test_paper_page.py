@@ -40,6 +40,7 @@ def student(
         "samples_per_s": 1000,
         "device": "cpu",
         "threads": 1,
+        "command": f"python examples/reproduce_paper.py --widths {width}",
     }
 
 
@@ -118,7 +119,6 @@ def table_of(*students, name="simulation"):
         "env_kwargs": paper_data.shard_jobs(table, config)["train"][0].as_dict()["env_kwargs"],
         "largest": {gait: config.largest(gait).tolist() for gait in table.gaits},
         "seed": 0,
-        "command": "python examples/reproduce_paper.py",
     }
 
 
@@ -137,6 +137,14 @@ def test_half_the_noise_stands_beside_the_papers_hardware():
     page = paper_page.paper_page({"tables": {"hardware_half_noise": own}})
     assert "0.5 times the environment's default" in page and "0.97101" in page and "> 0.971 " in page
     assert paper_page.noise_factor(True) == 1.0
+
+
+def test_every_command_that_made_a_student_is_named_once():
+    own = paper_page.made_by(table_of(student(), student(seed=1), student(width=2560)))
+    assert own.startswith(
+        "Made by `python examples/reproduce_paper.py --widths 512` and `python examples/reproduce_paper.py --widths "
+        "2560`, data seed 0; the trainings took 2 min"
+    )
 
 
 def test_clipped_commands_are_named():

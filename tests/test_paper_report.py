@@ -222,7 +222,9 @@ def test_a_quick_run_writes_both_tables_and_adds_to_them(tmp_path, monkeypatch, 
     out = tmp_path / "out"
     first = json.loads((out / "paper.json").read_text())["tables"]
     assert list(first) == ["simulation", "hardware"] and len(first["hardware"]["students"]) == 2
-    assert "--parts" not in first["hardware"]["command"] and first["hardware"]["versions"]["mujoco"]
+    (command,) = {own["command"] for own in first["hardware"]["students"]}
+    assert command.startswith("python examples/reproduce_paper.py hardware --kinds multi_head --quick")
+    assert "--parts" not in command and first["hardware"]["versions"]["mujoco"]
     pictures = {f"paper_{name}_{what}.png" for name in tables for what in ("loss", "targets", "contacts")}
     assert {path.name for path in out.glob("*.png")} == pictures
     page = (out / "paper.md").read_text()

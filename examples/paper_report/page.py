@@ -197,5 +197,6 @@ def clipped(table: Mapping[str, Any]) -> str:
 
 def made_by(table: Mapping[str, Any]) -> str:
     """How a table was made."""
+    commands = " and ".join(dict.fromkeys(f"`{own['command']}`" for own in table["students"]))
     minutes = sum(own["seconds"] for own in table["students"]) / 60
-    return f"Made by `{table['command']}`, data seed {table['seed']}; the trainings took {minutes:.0f} min together."
+    return f"Made by {commands}, data seed {table['seed']}; the trainings took {minutes:.0f} min together."

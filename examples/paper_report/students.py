@@ -87,6 +87,7 @@ class School:
         data: their demonstrations.
         device: "cpu" or "cuda".
         threads: of a training on a CPU; their number can change the last digits.
+        command: that the students are made by, written beside what is known of them.
     """
 
     table: Table
@@ -94,6 +95,7 @@ class School:
     data: PaperData
     device: str = "cpu"
     threads: int = 1
+    command: str = ""
 
     @property
     def folder(self) -> Path:
@@ -149,6 +151,7 @@ class School:
             "samples_per_s": round(config.steps * config.batch_size / seconds),
             "device": torch.cuda.get_device_name() if policy.device.type == "cuda" else "cpu",
             "threads": self.threads,
+            "command": self.command,
             "versions": versions(),
         }
 
