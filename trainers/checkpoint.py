@@ -112,20 +112,24 @@ def load(path: str | PathLike[str], device: torch.device | str = "cpu") -> "Mult
     return policy
 
 
-def load_as(kind: type[P], path: str | PathLike[str], device: torch.device | str = "cpu") -> P:
-    """Read a policy of one class.
+class SavedPolicy:
+    """How policies go to disk and come back, in place of stable-baselines3's pickles."""
 
-    Args:
-        kind: `MultiHeadPolicy` or `ClocklessPolicy`.
-        path, device: as in `load`.
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the policy to one zip file without pickles; see `trainers.checkpoint.save`."""
+        save(self, path)
 
-    Raises:
-        CheckpointError: as in `load`, or if the file holds the other one.
-    """
-    policy = load(path, device)
-    if not isinstance(policy, kind):
-        raise CheckpointError(f"{path} holds a {type(policy).__name__}, a {kind.__name__} was expected")
-    return policy
+    @classmethod
+    def load(cls: type[P], path: str | PathLike[str], device: torch.device | str = "cpu") -> P:
+        """Read what `save` wrote.
+
+        Raises:
+            CheckpointError: if the file is missing, damaged, or holds another kind of policy.
+        """
+        policy = load(path, device)
+        if not isinstance(policy, cls):
+            raise CheckpointError(f"{path} holds a {type(policy).__name__}, a {cls.__name__} was expected")
+        return policy
 
 
 def _clockless(

@@ -1,7 +1,6 @@
 """A student without a clock: it tells the phase of its gait from what it feels."""
 
 import math
-from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from go1_mtl_gym.clock import STAND_COMMAND
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.observation import ObservationLayout
 from go1_mtl_gym.validation import one_of
+from trainers.checkpoint import SavedPolicy
 from trainers.collection import EPISODE_S, watch
 from trainers.dataset import Demonstrations
 from trainers.environments import EnvFactory, PerturbationConfig, derive_seed, make_env
@@ -25,7 +25,7 @@ PHASE_0 = np.array([0.0, 1.0], dtype=np.float32)
 """Sine and cosine of phase 0."""
 
 
-class ClocklessPolicy(BasePolicy):
+class ClocklessPolicy(SavedPolicy, BasePolicy):
     """A student that learned with a gait clock, and an estimator that takes the clock's place.
 
     Its observation is the student's without the phase, with as many frames of proprioception as the estimator reads.
@@ -132,23 +132,6 @@ class ClocklessPolicy(BasePolicy):
         return {"student": self.student, "estimator": self.estimator, "correction": self.correction}
 
     # -- Files ---------------------------------------------------------------------------------------------------------
-
-    def save(self, path: str | PathLike[str]) -> None:
-        """Write the policy to one zip file without pickles; see `trainers.checkpoint`."""
-        from trainers.checkpoint import save
-
-        save(self, path)
-
-    @classmethod
-    def load(cls, path: str | PathLike[str], device: torch.device | str = "cpu") -> "ClocklessPolicy":
-        """Read what `save` wrote.
-
-        Raises:
-            CheckpointError: if the file is missing, damaged, or something else.
-        """
-        from trainers.checkpoint import load_as
-
-        return load_as(ClocklessPolicy, path, device)
 
 
 def learn_without_clock(

@@ -1,7 +1,6 @@
 """The student: one network for all gaits, as a stable-baselines3 policy."""
 
 from collections.abc import Mapping, Sequence
-from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -14,6 +13,7 @@ from torch import nn
 from go1_mtl_gym import TASKS
 from go1_mtl_gym.errors import InvalidInputError
 from trainers import normalization as norm
+from trainers.checkpoint import SavedPolicy
 from trainers.networks import MultiHeadActor, plain, seeded
 
 CRITIC_WIDTH = 64
@@ -24,7 +24,7 @@ def _constant_rate(_progress: float) -> float:
     return 3e-4
 
 
-class MultiHeadPolicy(ActorCriticPolicy):
+class MultiHeadPolicy(SavedPolicy, ActorCriticPolicy):
     """Actor with a shared trunk and one head per task, chosen by the one-hot task id that ends the observation.
 
     The trunk sees the normalised observation without the task id (clipped at `clip_sd`); the head gives the normalised
@@ -259,23 +259,6 @@ class MultiHeadPolicy(ActorCriticPolicy):
             )
 
     # -- Files ---------------------------------------------------------------------------------------------------------
-
-    def save(self, path: str | PathLike[str]) -> None:
-        """Write the policy to one zip file without pickles; see `trainers.checkpoint`."""
-        from trainers.checkpoint import save
-
-        save(self, path)
-
-    @classmethod
-    def load(cls, path: str | PathLike[str], device: torch.device | str = "cpu") -> "MultiHeadPolicy":
-        """Read what `save` wrote.
-
-        Raises:
-            CheckpointError: if the file is missing, damaged, or something else.
-        """
-        from trainers.checkpoint import load_as
-
-        return load_as(MultiHeadPolicy, path, device)
 
 
 def _check_arguments(
