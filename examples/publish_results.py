@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from expert_report.page import expert_block
+from paper_report.page import summary_table
 from publishing.runs import copy_run, read_json
 from publishing.text import (
     benchmarks,
@@ -21,8 +22,8 @@ from publishing.text import (
     gaits_block,
     made_by,
     new_gaits,
+    new_gaits_block,
     paper,
-    paper_block,
     presets_block,
     results_block,
     results_page,
@@ -55,8 +56,11 @@ def current_blocks(results: Path) -> dict[str, str]:
     """Text of every block of README.md that can be written from the code and from what `results` holds."""
     blocks = {"gaits": gaits_block(), "presets": presets_block()}
     if (results / "metrics.json").is_file():
-        metrics = read_json(results / "metrics.json")
-        blocks |= {"results": results_block(metrics), "paper": paper_block(metrics)}
+        blocks["results"] = results_block(read_json(results / "metrics.json"))
+    if (results / "new_gaits.json").is_file():
+        blocks["new_gaits"] = new_gaits_block(read_json(results / "new_gaits.json"))
+    if (results / "paper.json").is_file():
+        blocks["paper"] = summary_table(read_json(results / "paper.json")["tables"])
     if (results / "expert.json").is_file():
         expert = read_json(results / "expert.json")
         blocks["expert"] = expert_block(expert, made_by(expert))

@@ -102,6 +102,24 @@ def test_scores_stand_beside_the_papers():
     assert "paper" not in paper_page.score_table("simulation", own, "named", paper=False)
 
 
+def test_the_summary_has_a_row_per_way_of_training():
+    own = [student(seed=seed, r2=0.99 + 0.001 * seed) for seed in (0, 1, 2)] + [student("pooled", r2=0.98)]
+    own += [student("per_gait", gait="bound", r2=0.97), student("pooled", width=2560, r2=0.96)]
+    tables = {
+        "simulation": table_of(*own),
+        "hardware_half_noise": table_of(student(use="unseen"), name="hardware_half_noise"),
+    }
+    rows = [line.strip("| ").split(" | ") for line in paper_page.summary_table(tables).splitlines()[2:]]
+    narrow, wide = "512, 100, bfloat16", "2560, 100, bfloat16"
+    assert rows == [
+        ["simulation", "trot", "0.9195", "0.7701", narrow, "0.9910 ± 0.0025", "0.9800", "-"],
+        ["simulation", "trot", "0.9195", "0.7701", wide, "-", "0.9600", "-"],
+        ["simulation", "bound", "0.9918", "0.9069", narrow, "0.9900 ± 0.0025", "0.9790", "0.9690"],
+        ["simulation", "bound", "0.9918", "0.9069", wide, "-", "0.9590", "-"],
+        ["hardware half noise", "trot", "0.9710", "-", narrow, "0.9900", "-", "-"],
+    ]
+
+
 def test_what_misses_is_bold():
     own = [student(r2=0.9905, mse=0.002), student("pooled", r2=0.98, mse=0.001)]
     trot, bound = paper_page.verdict_table("simulation", own).splitlines()[2:]

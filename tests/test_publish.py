@@ -12,9 +12,11 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "examples"))
 
 import publish_results as publish  # noqa: E402
+from gait_report.page import new_gaits_table  # noqa: E402
 from publishing import runs  # noqa: E402
 
 from tests.test_new_gaits_page import DATA as NEW_GAITS  # noqa: E402
+from tests.test_paper_page import student, table_of  # noqa: E402
 
 CLOSED = {
     "survival_rate": 1.0,
@@ -45,7 +47,7 @@ EXPERT = {
 BEGIN, END = "<!-- gaits:begin -->", "<!-- gaits:end -->"
 README = "\n".join(
     f"text before {name}\n<!-- {name}:begin -->\nold {name}\n<!-- {name}:end -->"
-    for name in ("results", "gaits", "expert", "paper", "presets", "student")
+    for name in ("results", "gaits", "expert", "paper", "presets", "student", "new_gaits")
 )
 
 
@@ -82,10 +84,10 @@ def test_a_run_becomes_the_page_and_the_blocks(run, root):
     for text in (page, readme):
         assert "| trot | multi-head student | 0.001200 | 0.0120 | 0.9877 | 19/20 | 20/20 | 0.031 | 2.50 |" in text
         assert "Made by `python examples/dagger.py --seed 3`, seed 3, in 3 min of wall time." in text
-        assert "| trot | 0.9877 | - | 0.9195 | 0.7701 | simulation |" in text
+    assert "| trot | 0.9877 | - | 0.9195 | 0.7701 | simulation |" in page
     assert "9.9.9" in page and "| clone | 120 |" in page and "settings differ" in page
-    assert "old results" not in readme and "old paper" not in readme and "old gaits" not in readme
-    assert "old expert" in readme, "nothing is known of the expert yet"
+    assert "old results" not in readme and "old gaits" not in readme
+    assert all(f"old {name}" in readme for name in ("expert", "paper", "student", "new_gaits")), "nothing known yet"
     assert all(f"text before {name}" in readme for name in ("results", "expert")) and readme.endswith("text after\n")
 
 
@@ -142,8 +144,11 @@ def test_benchmarks_new_gaits_and_the_papers_tables_stand_on_the_page_once_they_
     made = {"command": "python examples/new_gaits.py", "seed": 2, "seconds": {"new_gaits": 600.0}}
     (results / "new_gaits.json").write_text(json.dumps(NEW_GAITS | made))
     (results / "paper.md").write_text("the paper's tables")
+    (results / "paper.json").write_text(json.dumps({"tables": {"simulation": table_of(student(r2=0.9876))}}))
     assert publish.main([], root) == 0
-    page = (results / "README.md").read_text(encoding="utf-8")
+    page, readme = (path.read_text(encoding="utf-8") for path in (results / "README.md", root / "README.md"))
+    assert "| 0.9195 | 0.7701 | 512, 100, bfloat16 | 0.9876 | - | - |" in readme
+    assert new_gaits_table(NEW_GAITS) in readme and "Made by `python examples/new_gaits.py`, seed 2" in readme
     assert all(title in page for title in titles)
     assert "| here | ours | 200 |" in page and "Made by `python b.py`." in page
     assert "Made by `python examples/new_gaits.py`, seed 2, in 10 min on one core." in page

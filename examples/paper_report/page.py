@@ -7,8 +7,8 @@ from typing import Any
 from go1_mtl_gym import EstimatorNoise
 from paper_report.config import TABLES
 from paper_report.data import NAMED, TRAIN, UNSEEN
-from paper_report.published import FIGURES, KINDS, PUBLISHED
-from paper_report.sums import Estimate, learners, scores, uses, verdicts
+from paper_report.published import FIGURES, KINDS, MULTI_HEAD, POOLED, PUBLISHED
+from paper_report.sums import Estimate, Learner, learners, scores, uses, verdicts
 from trainers.report import markdown, number
 
 TITLES = {
@@ -19,7 +19,7 @@ TITLES = {
 SHOWN = {"mse": "MSE [rad^2]", "mae": "MAE [rad]", "r2": "R2", "r2_joint_mean": "R2, mean of joints"}
 DIGITS = {"mse": ".6f", "mae": ".5f", "r2": ".5f", "r2_joint_mean": ".5f"}
 USES = {NAMED: "the authors' held-out command", UNSEEN: "other held-out commands"}
-OWN_KINDS = {"multi_head": "multi-task", "pooled": "single-task"}
+OWN_KINDS = {MULTI_HEAD: "multi-task", POOLED: "single-task"}
 """What the paper calls them."""
 PICTURES = {
     "loss": "Held-out loss per gait over the gradient steps; a line per training seed",
@@ -76,6 +76,27 @@ def section(name: str, table: Mapping[str, Any], pictures: Sequence[str] = ()) -
 
 
 # -- Tables ------------------------------------------------------------------------------------------------------------
+
+
+def summary_table(tables: Mapping[str, Mapping[str, Any]]) -> str:
+    """R2 alone, of every table: one row per gait and way of training, the paper's beside ours.
+
+    Args:
+        tables: name -> what ``paper.json`` holds of it; the first of its held-out rows are shown.
+    """
+    rows = []
+    for name, table in tables.items():
+        published = PUBLISHED[TABLES[name].published]
+        for gait, paper in published.items():
+            theirs = [number(paper.get(kind, {}).get("r2"), ".4f") for kind in (MULTI_HEAD, POOLED)]
+            own = scores(table["students"], gait, uses(table["students"])[0])
+            for width, steps, precision in dict.fromkeys(learner[:3] for learner in own):
+                found = [own.get(Learner(width, steps, precision, rank)) for rank in range(len(KINDS))]
+                ours = ["-" if each is None else _cell(each["r2"], ".4f") for each in found]
+                rows.append([name.replace("_", " "), gait, *theirs, f"{width}, {steps}, {precision}", *ours])
+    theirs = [f"{OWN_KINDS[kind]}, paper" for kind in (MULTI_HEAD, POOLED)]
+    header = ["data", "gait", *theirs, "width, steps, trained in", *(f"{kind}, here" for kind in KINDS.values())]
+    return markdown(header, rows, text_columns=2)
 
 
 def score_table(name: str, students: Sequence[Mapping[str, Any]], use: str, paper: bool) -> str:

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from expert_report.page import PICTURES, expert_section
-from gait_report.page import new_gaits_section
+from gait_report.page import NOTE, new_gaits_section, new_gaits_table
 from main_job.config import PRESETS, JobConfig
 from student_report.page import CHAPTERS, student_section
 
@@ -49,9 +49,9 @@ def results_block(metrics: Mapping[str, Any]) -> str:
     return "\n\n".join([results_table(metrics), made_by(metrics)])
 
 
-def paper_block(metrics: Mapping[str, Any]) -> str:
-    """R2 here and in the paper, for README.md."""
-    return paper_table(metrics)
+def new_gaits_block(data: Mapping[str, Any]) -> str:
+    """New gaits for a trained policy, for README.md."""
+    return "\n\n".join([new_gaits_table(data), f"{NOTE} {made_by(data)}"])
 
 
 def gaits_block() -> str:
