@@ -7,6 +7,7 @@ import numpy as np
 from expert_report.figures import OWN, legend, new_figure
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 import trainers
 from go1_mtl_gym import robot
@@ -35,6 +36,7 @@ def loss_figure(students: Sequence[Mapping[str, Any]], gaits: Sequence[str]) -> 
             label = f"{KINDS[own['kind']]}, {own['width']} wide"
             ax.plot(own["curve"]["steps"], own["curve"]["mse"][gait], style, color=COLOURS[own["kind"]], label=label)
         ax.set_yscale("log")
+        ax.xaxis.set_major_locator(MaxNLocator(4))
         ax.set_title(gait, fontsize=10)
         ax.set_xlabel("gradient steps", fontsize=9)
         ax.tick_params(labelsize=8)
