@@ -1,6 +1,5 @@
 """Finished parts of a report on disk, so that Ctrl-C costs little: named by what made them, measured side by side."""
 
-import contextlib
 import functools
 import hashlib
 import json
@@ -13,7 +12,6 @@ from types import ModuleType
 from typing import Any, Protocol
 
 import joblib
-import torch
 from threadpoolctl import threadpool_limits
 from tqdm.auto import tqdm
 
@@ -56,17 +54,6 @@ def finished(path: Path, measure: Callable[[], dict[str, Any]]) -> dict[str, Any
     part["seconds"] = round(time.monotonic() - start, 2)
     write_json(path, part)
     return json_ready(part)
-
-
-@contextlib.contextmanager
-def torch_threads(count: int) -> Iterator[None]:
-    """With so many threads in PyTorch."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(count)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
 
 
 def measure_all(parts: Sequence[Part], n_jobs: int) -> list[dict[str, Any]]:

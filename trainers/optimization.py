@@ -1,4 +1,4 @@
-"""The optimiser and the schedule of everything that is trained here."""
+"""The optimiser and the schedule of everything that is trained here, and how PyTorch computes meanwhile."""
 
 import contextlib
 from collections.abc import Iterator, Sequence
@@ -18,6 +18,17 @@ def matmul_precision(precision: str) -> Iterator[None]:
         yield
     finally:
         torch.set_float32_matmul_precision(before)
+
+
+@contextlib.contextmanager
+def torch_threads(count: int) -> Iterator[None]:
+    """With so many threads in PyTorch."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(count)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
 
 
 def adamw_one_cycle(

@@ -1,17 +1,16 @@
 """Taking turns, and what is said about it."""
 
-import contextlib
 import dataclasses
 import tempfile
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
 from threadpoolctl import threadpool_limits
 
+from trainers.optimization import torch_threads
 from training_parts.settings import Settings
 
 RATE = "samples_per_s"
@@ -112,17 +111,7 @@ def spread(values: Sequence[float]) -> dict[str, float]:
 
 def run(heat: Heat, rounds: int, after_round: Callable[[], Any]) -> list[dict[str, Any]]:
     """All turns of a heat."""
-    with _threads(heat.threads), tempfile.TemporaryDirectory() as folder:
+    threads = heat.threads
+    with torch_threads(threads), threadpool_limits(threads), tempfile.TemporaryDirectory() as folder:
         values = interleaved(heat.contestants(Path(folder)), rounds, after_round)
     return [{"setting": heat.setting, **row} for row in summary(values, heat.references)]
-
-
-@contextlib.contextmanager
-def _threads(count: int) -> Iterator[None]:
-    before = torch.get_num_threads()
-    torch.set_num_threads(count)
-    try:
-        with threadpool_limits(count):
-            yield
-    finally:
-        torch.set_num_threads(before)

@@ -12,7 +12,7 @@ import numpy as np
 import torch
 from main_job.config import JobConfig
 from main_job.students import new_policy
-from report_parts import digest, torch_threads
+from report_parts import digest
 from tqdm.auto import tqdm
 
 import trainers
@@ -24,6 +24,7 @@ from paper_report.published import KINDS, PER_GAIT, POOLED
 from paper_report.sums import learner_of
 from trainers.checkpoint import versions
 from trainers.files import write_json
+from trainers.optimization import torch_threads
 
 UNUSED = ("steps", "seed", "log_interval", "matmul_precision", "autocast")
 """Settings of the cloning that a folder of students is not named by: files are, or they change no student."""

@@ -10,11 +10,12 @@ from typing import Any, TextIO
 
 import joblib
 from main_job.config import JobConfig
-from report_parts import digest, torch_threads
+from report_parts import digest
 from tqdm.auto import tqdm
 
 import trainers
 from trainers.files import write_json
+from trainers.optimization import torch_threads
 
 UNUSED = ("preset", "n_envs", "device", "threads", "episodes", "video_s")
 """Settings of the main job that a lesson does not use; the others tell one student from another."""
