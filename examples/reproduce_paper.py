@@ -2,6 +2,7 @@
 
 python examples/reproduce_paper.py simulation                                trot, jump, bound at 1 kHz; 512 wide
 python examples/reproduce_paper.py hardware hardware_half_noise              trot and walk, rates and noise of a robot
+python examples/reproduce_paper.py hardware_estimator          likewise, with an expert that has to estimate its state
 python examples/reproduce_paper.py simulation hardware --widths 2560 --seeds 0                       the paper's width
 python examples/reproduce_paper.py simulation --widths 512 2560 --device cuda                            both, on a GPU
 python examples/reproduce_paper.py simulation hardware --quick --out-dir runs/quick              a minute's worth
@@ -113,7 +114,7 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
     add = parser.add_argument
-    add("tables", nargs="+", choices=tuple(TABLES), help="which; hardware_half_noise is beside hardware")
+    add("tables", nargs="+", choices=tuple(TABLES), help="which; two more are beside hardware")
     add("--kinds", nargs="+", choices=tuple(KINDS), default=list(KINDS), help="of students")
     add("--widths", type=int, nargs="+", default=None, help=f"units per hidden layer; None: {FULL.widths}")
     add("--seeds", type=int, nargs="+", default=None, help=f"of the trainings; None: {FULL.seeds}")

@@ -16,6 +16,7 @@ from go1_mtl_gym.perturbation import PerturbationWrapper
 from go1_mtl_gym.randomization import DomainRandomization
 from go1_mtl_gym.registration import env_id, register_built_in, register_task
 from go1_mtl_gym.state import RobotState
+from go1_mtl_gym.state_estimator import StateEstimatorConfig
 from go1_mtl_gym.tasks import PAPER_TASKS, TASKS, Task
 
 __all__ = [
@@ -32,6 +33,7 @@ __all__ = [
     "PerturbationWrapper",
     "RobotState",
     "SensorNoise",
+    "StateEstimatorConfig",
     "Task",
     "env_id",
     "register_task",

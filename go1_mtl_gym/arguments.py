@@ -13,6 +13,7 @@ from go1_mtl_gym.observation import SensorNoise
 from go1_mtl_gym.randomization import DomainRandomization
 from go1_mtl_gym.realism import Realism
 from go1_mtl_gym.simulation import PHYSICS_HZ
+from go1_mtl_gym.state_estimator import StateEstimatorConfig
 from go1_mtl_gym.tasks import TASKS
 from go1_mtl_gym.validation import number_in, one_of
 
@@ -59,11 +60,12 @@ def check_conditions(given: Mapping[str, Any], figures: Mapping[str, Any]) -> Co
     """Return what the environment's episodes take place under.
 
     Args:
-        given: the environment's arguments by name, among them noise, estimator_noise and randomization.
+        given: the environment's arguments by name, among them noise, estimator_noise, state_estimator
+            and randomization.
         figures: all further keyword arguments; those of `Realism`.
 
     Raises:
-        InvalidInputError: for an unknown name or an impossible figure.
+        InvalidInputError: for an unknown name, an impossible figure, or both ways to estimate a state.
     """
     for name in figures:
         one_of(name, (*given, *(each.name for each in fields(Realism))), "argument of Go1Env")
@@ -71,6 +73,7 @@ def check_conditions(given: Mapping[str, Any], figures: Mapping[str, Any]) -> Co
         Realism(**figures),
         check_switch(given["noise"], SensorNoise, "noise"),
         check_switch(given["estimator_noise"], EstimatorNoise, "estimator_noise"),
+        check_switch(given["state_estimator"], StateEstimatorConfig, "state_estimator"),
         check_switch(given["randomization"], DomainRandomization, "randomization"),
     )
 

@@ -1,15 +1,17 @@
-"""What an environment's episodes take place under: physics, sensor noise and estimator noise."""
+"""What an environment's episodes take place under: physics, sensor noise and what the expert knows of the state."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from go1_mtl_gym.episode import Episode
+from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.estimator import EstimatorError, EstimatorNoise
 from go1_mtl_gym.observation import SensorNoise
 from go1_mtl_gym.randomization import DomainRandomization
 from go1_mtl_gym.realism import Realism
 from go1_mtl_gym.simulation import Simulation
+from go1_mtl_gym.state_estimator import StateEstimator, StateEstimatorConfig
 
 
 @dataclass(frozen=True)
@@ -19,33 +21,43 @@ class Conditions:
     Attributes:
         realism: what is different about the physics.
         sensor_noise: of the sensors, or None.
-        estimator_noise: of the expert's state estimator, or None.
+        estimator_noise: on the state that the expert sees, or None.
+        state_estimator: that tells the expert the state from the sensors, or None.
         randomization: of physics and sensor noise, or None.
 
     Raises:
-        InvalidInputError: if the randomization can draw impossible sensor noise.
+        InvalidInputError: if the randomization can draw impossible sensor noise, or the expert is to have both an
+            estimator and another's noise.
     """
 
     realism: Realism
     sensor_noise: SensorNoise | None
     estimator_noise: EstimatorNoise | None
+    state_estimator: StateEstimatorConfig | None
     randomization: DomainRandomization | None
 
     def __post_init__(self) -> None:
+        if self.estimator_noise is not None and self.state_estimator is not None:
+            raise InvalidInputError(
+                "estimator_noise stands for the errors of an estimator and state_estimator has its own: give one of "
+                f"them, got {self.estimator_noise} and {self.state_estimator}"
+            )
         if self.randomization is not None and self.randomization.noise is not None:
             self._scaled_noise(self.randomization.noise[1])
 
     def begin(self, episode: Episode, simulation: Simulation, rng: np.random.Generator) -> None:
-        """Give an episode its noise, and the simulation its physics.
+        """Give an episode its noise and its estimator, and the simulation its physics.
 
         Args:
-            episode: gets `sensor_noise` and `estimator_error`.
+            episode: gets `sensor_noise`, `estimator_error` and `state_estimator`.
             simulation: gets its realism if there is a randomization, and is left alone otherwise.
             rng: gives one number for the estimator noise and one for the randomization, whatever is drawn from them.
         """
         episode.sensor_noise = self.sensor_noise
         if self.estimator_noise is not None:
             episode.estimator_error = EstimatorError(self.estimator_noise, int(rng.integers(2**63)))
+        if self.state_estimator is not None:
+            episode.state_estimator = StateEstimator(self.state_estimator)
         if self.randomization is not None:
             own = np.random.default_rng(int(rng.integers(2**63)))
             realism, factor = self.randomization.draw(own, self.realism)

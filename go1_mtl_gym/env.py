@@ -22,6 +22,7 @@ from go1_mtl_gym.realism import Realism
 from go1_mtl_gym.registration import register_task
 from go1_mtl_gym.simulation import PHYSICS_HZ, Simulation
 from go1_mtl_gym.state import RobotState
+from go1_mtl_gym.state_estimator import StateEstimatorConfig
 from go1_mtl_gym.tasks import TASKS, Task, check_task_names
 from go1_mtl_gym.termination import how_it_ended
 from go1_mtl_gym.validation import finite_vector, number_in, one_of
@@ -44,9 +45,8 @@ class Go1Env(gymnasium.Env):
     Episode: starts standing at phase 0 of the gait clock; terminates on a fall (trunk below 0.14 m or tilted by more
     than 60 degrees) or when the physics diverges; truncates after `episode_s`.
 
-    Info: task, command (asked for), filtered_command (seen by expert and student), base_velocity (measured vx, vy, yaw
-    rate in the heading frame), contacts, phase, standing, reward_terms, fallen, ended ("", "fall", "unstable" or
-    "time").
+    Info: task, command, filtered_command (seen by expert and student), base_velocity (vx, vy, yaw rate in the heading
+    frame), contacts, phase, standing, reward_terms, fallen, ended ("", "fall", "unstable" or "time").
 
     Version history: v0, first.
 
@@ -60,14 +60,15 @@ class Go1Env(gymnasium.Env):
         noise: True for the default `SensorNoise`, or one of your own; None for exact sensors.
         estimator_noise: True for the default `EstimatorNoise`, or one of your own: the expert then sees
             `estimated_state`; None shows it the true state.
+        state_estimator: True for the default `StateEstimatorConfig`, or one of your own: the expert then sees what a
+            filter makes of the observation's own readings; for a `control_hz` of some hundreds, no `estimator_noise`.
         randomization: True for the default `DomainRandomization` of physics and sensor noise, drawn at every reset, or
             one of your own.
         episode_s: length of an episode [s].
         expert: ``"module:Class"`` or a callable; called with ``gains=PDGains, hold_s=control period`` on first use,
             must give an object with ``reset(state)`` and ``action(state)``, which returns 12 joint targets [rad] for a
             `RobotState`.
-        render_mode: None, "human" or "rgb_array".
-        width, height: size of the picture [pixels].
+        render_mode, width, height: None, "human" or "rgb_array", and the size of the picture [pixels].
         realism: differences from the expert's model: ``friction=``, ``payload_kg=`` and the other fields of `Realism`.
 
     Raises:
@@ -88,6 +89,7 @@ class Go1Env(gymnasium.Env):
         kd: float = 2.0,
         noise: SensorNoise | bool | None = None,
         estimator_noise: EstimatorNoise | bool | None = None,
+        state_estimator: StateEstimatorConfig | bool | None = None,
         randomization: DomainRandomization | bool | None = None,
         episode_s: float = 30.0,
         expert: str | Callable[..., Any] = DEFAULT_EXPERT,
@@ -110,7 +112,7 @@ class Go1Env(gymnasium.Env):
         self.observation_space = Box(self.layout.low, self.layout.high, dtype=np.float32)
         self.action_space = Box(-1.0, 1.0, (12,), dtype=np.float32)
         self.render_mode = render_mode
-        self._observer = Observer(self.layout, self.tasks)
+        self._observer = Observer(self.layout, self.tasks, self.control_s)
         self._episode_steps = round(number_in(episode_s, self.control_s, 1e6, "episode_s") * self.control_hz)
         self._conditions = arguments.check_conditions(given, realism)
         self._simulation = Simulation(self.gains, self._conditions.realism)
@@ -142,13 +144,12 @@ class Go1Env(gymnasium.Env):
         joint_noise = self.np_random.uniform(-RESET_JOINT_NOISE, RESET_JOINT_NOISE, 12)
         self._conditions.begin(self._episode, self._simulation, self.np_random)
         self._simulation.reset(robot.HOME_POSE + joint_noise)
+        observation = self._observer.observe(self._simulation, self.state, self._episode, self.np_random)
         if self._expert is not None:
             self._expert.reset(self.estimated_state)
-        state = self.state
-        observation = self._observer.observe(self._simulation, state, self._episode, self.np_random)
         if self.render_mode == "human":
             self.render()
-        return observation, self._episode.info(state, {}, "")
+        return observation, self._episode.info(self.state, {}, "")
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict]:
         """Hold one action for a control period.
@@ -226,7 +227,7 @@ class Go1Env(gymnasium.Env):
 
     @property
     def estimated_state(self) -> RobotState:
-        """All that an expert may read, now: `state` with the errors of the `estimator_noise`."""
+        """All that an expert may read, now: `state`, with `estimator_noise` or as the `state_estimator` has it."""
         return self._running("estimated_state").estimated(self.state)
 
     def expert_action(self) -> np.ndarray:

@@ -11,6 +11,7 @@ from go1_mtl_gym.estimator import EstimatorError
 from go1_mtl_gym.observation import SensorNoise
 from go1_mtl_gym.rewards import reward_terms
 from go1_mtl_gym.state import RobotState
+from go1_mtl_gym.state_estimator import StateEstimator
 from go1_mtl_gym.tasks import Task
 
 COMMAND_FILTER_S = 0.2
@@ -49,7 +50,8 @@ class Episode:
         time_s: since the reset [s].
         next_task: what will be asked for as soon as the present gait can be left, or None.
         sensor_noise: what is added to the sensors' readings, or None.
-        estimator_error: what the expert's state estimator gets wrong, or None for the true state.
+        estimator_error: what the expert's state estimator gets wrong, or None.
+        state_estimator: the expert's, fed by the observation, or None; without either the expert sees the true state.
     """
 
     task: Task
@@ -63,6 +65,7 @@ class Episode:
     next_task: Task | None = None
     sensor_noise: SensorNoise | None = None
     estimator_error: EstimatorError | None = None
+    state_estimator: StateEstimator | None = None
 
     @property
     def requested_task(self) -> Task:
@@ -96,7 +99,8 @@ class Episode:
 
     def estimated(self, state: RobotState) -> RobotState:
         """What the state estimator makes of the true state, now."""
-        return state if self.estimator_error is None else self.estimator_error.estimate(state)
+        estimator = self.state_estimator or self.estimator_error
+        return state if estimator is None else estimator.estimate(state)
 
     def rewards(self, state: RobotState, torque: np.ndarray, ended: str) -> dict[str, float]:
         """The reward terms of the step that led to a state.

@@ -14,11 +14,13 @@ class Observer:
     Args:
         layout: which parts there are.
         tasks: names in the order of the task id.
+        control_s: time between two observations [s].
     """
 
-    def __init__(self, layout: ObservationLayout, tasks: tuple[str, ...]) -> None:
+    def __init__(self, layout: ObservationLayout, tasks: tuple[str, ...], control_s: float) -> None:
         self._layout = layout
         self._tasks = tasks
+        self._control_s = control_s
 
     @staticmethod
     def state(simulation: Simulation, episode: Episode) -> RobotState:
@@ -46,7 +48,8 @@ class Observer:
         Args:
             simulation: whose sensors are read.
             state: the robot's state now.
-            episode: has the noise of the sensors; its present frame is added to `older_frames`.
+            episode: has the noise of the sensors; its present frame is added to `older_frames`, and its
+                `state_estimator` is told what the student sees.
             rng: of the noise.
         """
         reading = simulation.read()
@@ -71,4 +74,10 @@ class Observer:
             episode.older_frames.extend([frame] * (self._layout.history - 1))
         observation = self._layout.flatten(parts, episode.older_frames, self._tasks.index(episode.task.name))
         episode.older_frames.appendleft(frame)
+        if episode.state_estimator is not None and simulation.stable:
+            readings = {name: observation[self._layout.slices[name]].astype(np.float64) for name in PROPRIOCEPTION}
+            if episode.steps == 0:
+                episode.state_estimator.begin(state, readings)
+            else:
+                episode.state_estimator.update(readings, self._control_s)
         return observation

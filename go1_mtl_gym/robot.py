@@ -51,6 +51,9 @@ HIP_POSITION_B.flags.writeable = False
 LEG_SIDE = np.array([1.0, -1.0, 1.0, -1.0])
 LEG_SIDE.flags.writeable = False
 """+1 for left legs, -1 for right legs, shape (4,)."""
+IMU_POSITION_B = np.array([-0.01592, -0.06659, -0.00617])
+IMU_POSITION_B.flags.writeable = False
+"""Inertial unit in the trunk frame [m], shape (3,); its axes are the trunk's."""
 NOMINAL_FOOT_B = HIP_POSITION_B + np.outer(LEG_SIDE, [0.0, HIP_TO_THIGH, 0.0])
 NOMINAL_FOOT_B.flags.writeable = False
 """Points of the trunk frame under which the feet stand [m], shape (4, 3)."""

@@ -157,6 +157,13 @@ def test_half_the_noise_stands_beside_the_papers_hardware():
     assert paper_page.noise_factor(True) == 1.0
 
 
+def test_what_the_expert_knows_of_the_state_is_named():
+    own = table_of(student(use="unseen"), name="hardware_estimator")
+    text = paper_page.differences("hardware", own)
+    assert "a Kalman filter tells it" in text and "independent" not in text
+    assert "a Kalman filter" not in paper_page.differences("hardware", table_of(student(use="unseen"), name="hardware"))
+
+
 def test_every_command_that_made_a_student_is_named_once():
     own = paper_page.made_by(table_of(student(), student(seed=1), student(width=2560)))
     assert own.startswith(

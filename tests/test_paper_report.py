@@ -63,6 +63,9 @@ def test_the_full_settings_are_the_papers():
     assert half.velocity == 0.5 * EstimatorNoise().velocity
     assert paper_config.HALF_NOISE.student_kwargs == hardware.student_kwargs
     assert hardware.env_kwargs == hardware.student_kwargs | {"estimator_noise": True}
+    own = paper_config.ESTIMATOR
+    assert own.student_kwargs == hardware.student_kwargs and own.env_kwargs["estimator_noise"] is None
+    assert own.env_kwargs["state_estimator"] is True
     assert len(full.seeds) == 5 and full.normalization == "min_max"
 
 

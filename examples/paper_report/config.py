@@ -21,6 +21,8 @@ PRECISIONS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
 )
 """Name -> how `trainers.BCConfig` asks for it. "medium" multiplies matrices in bfloat16 and keeps float32 between them,
 "bfloat16" computes all of the network in it; weights, loss and measurements are float32 in all of them."""
+EXPERTS_ALONE = ("estimator_noise", "state_estimator")
+"""Arguments of `go1_mtl_gym.Go1Env` that only its expert notices."""
 MOST_COMMANDS = 100
 """Most commands of one use; their seeds stand this far apart."""
 
@@ -63,7 +65,7 @@ class Table:
     @property
     def student_kwargs(self) -> dict[str, Any]:
         """Of the students' environments: what only the expert notices is left out."""
-        return {name: value for name, value in self.env_kwargs.items() if name != "estimator_noise"}
+        return {name: value for name, value in self.env_kwargs.items() if name not in EXPERTS_ALONE}
 
 
 SIMULATION = Table(
@@ -82,7 +84,14 @@ HALF_NOISE = Table(
 )
 """With the whole noise, what an expert makes of the true state differs from its noisy answer by more than the paper's
 students do from theirs."""
-TABLES = MappingProxyType({table.name: table for table in (SIMULATION, HARDWARE, HALF_NOISE)})
+ESTIMATOR = Table(
+    "hardware_estimator",
+    "hardware",
+    ("trot", "walk"),
+    {**HARDWARE_LIKE, "estimator_noise": None, "state_estimator": True},
+)
+"""As on a robot, where what the expert knows of the state comes from the readings that the student sees."""
+TABLES = MappingProxyType({table.name: table for table in (SIMULATION, HARDWARE, HALF_NOISE, ESTIMATOR)})
 """The tables by name, in the order of the page."""
 
 

@@ -15,6 +15,7 @@ TITLES = {
     "simulation": "Simulation",
     "hardware": "Hardware, and data like a robot's",
     "hardware_half_noise": "Hardware, and data like a robot's with half the noise",
+    "hardware_estimator": "Hardware, and data like a robot's with a state estimator",
 }
 SHOWN = {"mse": "MSE [rad^2]", "mae": "MAE [rad]", "r2": "R2", "r2_joint_mean": "R2, mean of joints"}
 DIGITS = {"mse": ".6f", "mae": ".5f", "r2": ".5f", "r2_joint_mean": ".5f"}
@@ -189,15 +190,28 @@ def differences(name: str, table: Mapping[str, Any]) -> str:
     if name == "hardware":
         points.append(
             "World: the paper's walks are a real robot's. Ours is simulated, with the paper's rates (MPC 100 Hz, whole "
-            f"body {env['control_hz']} Hz), white noise on the student's sensors, white noise and a bias per episode "
-            f"on the expert's estimate of the state ({noise_factor(env['estimator_noise']):g} times the environment's "
-            f"default), and {1000 * env['action_delay_s']:g} ms of delay. The two noises are independent of each "
-            "other, so a part of the expert's answer cannot be told from what the student sees; on a robot, estimate "
-            "and observation come from the same readings."
+            f"body {env['control_hz']} Hz), white noise on the student's sensors, {1000 * env['action_delay_s']:g} ms "
+            f"of delay, and {estimate(env)}"
         )
     else:
         points.append("World: MuJoCo with our model of the robot, flat ground, no noise, 1 kHz.")
     return "\n".join(f"- {point}" for point in points)
+
+
+def estimate(env: Mapping[str, Any]) -> str:
+    """What the expert knows of the state in an environment with these arguments, as the end of a sentence."""
+    if env.get("state_estimator"):
+        return (
+            "an expert that does not know the state: a Kalman filter tells it what it can, from the inertial unit, "
+            "the joints and the contacts, the very readings that the student sees. As on a robot, but there contacts "
+            "are uncertain too."
+        )
+    return (
+        "white noise and a bias per episode on the expert's estimate of the state "
+        f"({noise_factor(env['estimator_noise']):g} times the environment's default). The noises of estimate and "
+        "sensors are independent of each other, so a part of the expert's answer cannot be told from what the student "
+        "sees; on a robot, estimate and observation come from the same readings."
+    )
 
 
 def noise_factor(noise: bool | Mapping[str, float]) -> float:

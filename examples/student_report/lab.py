@@ -16,7 +16,7 @@ EXPERT = "expert"
 SHARED = ("tasks", "control_hz", "kp", "kd")
 """Arguments of the students' environments that the expert's has as well; the others shape what only students see."""
 
-WORLD = ("randomization", "noise", "estimator_noise", *(each.name for each in fields(Realism)))
+WORLD = ("randomization", "noise", "estimator_noise", "state_estimator", *(each.name for each in fields(Realism)))
 """Arguments in which the environment that a student was trained in may differ; here all walk in the model's world."""
 
 

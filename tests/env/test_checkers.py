@@ -15,10 +15,11 @@ KWARGS = [
     {"noise": True, "control_hz": 100, "kp": 30.0, "kd": 1.0},
     {"friction": 0.5, "payload_kg": 2.0, "action_delay_s": 0.025, "estimator_noise": True},
     {"randomization": True},
+    {"state_estimator": True, "noise": True},
 ]
 
 
-@pytest.mark.parametrize("kwargs", KWARGS, ids=["plain", "channels", "noise", "real", "random"])
+@pytest.mark.parametrize("kwargs", KWARGS, ids=["plain", "channels", "noise", "real", "random", "filtered"])
 @pytest.mark.parametrize("task", [None, *TASKS])
 def test_both_checkers_pass_without_a_warning(task, kwargs):
     env = gymnasium.make(env_id(task), disable_env_checker=True, **kwargs)

@@ -13,6 +13,7 @@ COPIERS = pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda env: pickl
 
 REAL = {"friction": 0.6, "payload_kg": 1.0, "action_delay_s": 0.025, "estimator_noise": True}
 RANDOM = {"randomization": True, "estimator_noise": True}
+FILTERED = {"noise": True, "control_hz": 500, "state_estimator": True}
 
 
 def walking(steps: int, **kwargs) -> Go1Env:
@@ -42,15 +43,15 @@ def agree(one: Go1Env, two: Go1Env, steps: int, rng_seed: int = 0) -> None:
 
 
 @COPIERS
-@pytest.mark.parametrize("kwargs", [{}, {"noise": True, "control_hz": 100}, REAL, RANDOM],
-                         ids=["exact", "noisy", "real", "random"])  # fmt: skip
+@pytest.mark.parametrize("kwargs", [{}, {"noise": True, "control_hz": 100}, REAL, RANDOM, FILTERED],
+                         ids=["exact", "noisy", "real", "random", "filtered"])  # fmt: skip
 def test_a_copy_in_the_middle_of_an_episode_continues_to_the_bit(duplicate, kwargs):
     env = walking(20, **kwargs)
     agree(env, duplicate(env), 30)
 
 
 @COPIERS
-@pytest.mark.parametrize("kwargs", [{}, REAL], ids=["exact", "real"])
+@pytest.mark.parametrize("kwargs", [{}, REAL, FILTERED], ids=["exact", "real", "filtered"])
 def test_a_copys_expert_gives_the_same_labels(duplicate, kwargs):
     env = walking(20, **kwargs)
     twin = duplicate(env)

@@ -22,6 +22,11 @@ def test_total_mass_is_that_of_a_go1(model):
     assert -model.opt.gravity[2] == robot.GRAVITY
 
 
+def test_the_inertial_unit_sits_where_robot_py_says_and_is_not_turned(model):
+    np.testing.assert_array_equal(model.site("imu").pos, robot.IMU_POSITION_B)
+    np.testing.assert_array_equal(model.site("imu").quat, [1.0, 0.0, 0.0, 0.0])
+
+
 def test_joints_stand_in_the_order_of_robot_py(model):
     hinges = [model.joint(i) for i in range(model.njnt) if model.joint(i).type[0] == mujoco.mjtJoint.mjJNT_HINGE]
     assert tuple(joint.name for joint in hinges) == robot.JOINTS
