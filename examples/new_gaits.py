@@ -12,7 +12,6 @@ Writes new_gaits.json and new_gaits.png and prints a table: success, survival an
 
 import argparse
 import dataclasses
-import os
 import shlex
 import sys
 from pathlib import Path
@@ -23,10 +22,9 @@ from gait_report.config import QUICK, NewGaitsConfig
 from gait_report.page import new_gaits_figure, new_gaits_table
 from gait_report.parts import assembled, parts_of, prepare
 from publishing.runs import without_out
-from report_parts import exit_status, measure_all
+from report_parts import exit_status, measure_all, parse_report, report_parser
 from student_report.lab import Walker
 
-from go1_mtl_gym.validation import number_in
 from trainers.checkpoint import load, versions
 from trainers.files import write_json
 from trainers.pretrained import FOLDER
@@ -64,22 +62,13 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     Raises:
         InvalidInputError: for an impossible number.
     """
-    parser = argparse.ArgumentParser(
-        description="Teach a trained policy gaits that it does not know, in several ways, and measure how it walks.",
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
-    )
+    description = "Teach a trained policy gaits that it does not know, in several ways, and measure how it walks."
+    parser = report_parser(description, PARTS, seed="of the evaluation's commands and resets")
     add = parser.add_argument
     add("--policy", type=Path, default=Path(str(FOLDER / "clocked.zip")), help="file of the trained policy")
     add("--gaits", nargs="+", default=list(GAITS), help="that the policy does not know")
-    add("--quick", action="store_true", help="little data and short episodes, to see that everything works")
-    add("--seed", type=int, default=1, help="of the evaluation's commands and resets")
-    add("--n-jobs", type=int, default=os.cpu_count() or 1, help="processes")
-    add("--parts", type=Path, default=PARTS, help="folder of finished parts, from which an interrupted run goes on")
     add("--out-dir", type=Path, default=OUT, help="folder of the results and the figure")
-    options = parser.parse_args(arguments)
-    number_in(options.seed, 0, 2**31 - 1, "seed")
-    number_in(options.n_jobs, 1, 1024, "n_jobs")
-    return options
+    return parse_report(parser, arguments)
 
 
 @exit_status

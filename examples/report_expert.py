@@ -9,7 +9,6 @@ The file holds what this command asked for and nothing else; whatever part was m
 
 import argparse
 import dataclasses
-import os
 import shlex
 import sys
 from collections.abc import Sequence
@@ -21,10 +20,9 @@ from expert_report.figures import save_figures
 from expert_report.page import card_table, totals_text
 from expert_report.parts import QUICK, SECTIONS, Part, Section
 from publishing.runs import without_out
-from report_parts import exit_status, measure_all
+from report_parts import exit_status, measure_all, parse_report, report_parser
 
 from go1_mtl_gym import TASKS
-from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import number_in
 from trainers.checkpoint import versions
 from trainers.files import write_json
@@ -110,29 +108,19 @@ def parse(arguments: list[str] | None = None) -> argparse.Namespace:
     """Read the command line.
 
     Raises:
-        InvalidInputError: for an impossible number.
+        InvalidInputError: for an impossible number, or something that was named twice.
     """
-    parser = argparse.ArgumentParser(
-        description="Measure the expert in closed loop and write its report card.",
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
-    )
+    description = "Measure the expert in closed loop and write its report card."
+    parser = report_parser(description, PARTS, seed="of commands, resets and kicks")
     add = parser.add_argument
     add("--tasks", nargs="+", choices=tuple(TASKS), default=list(TASKS), help="gaits")
     add("--sections", nargs="+", choices=tuple(SECTIONS), default=list(SECTIONS), help="what is measured")
-    add("--quick", action="store_true", help="few and short episodes, to see that everything works")
-    add("--seed", type=int, default=1, help="of commands, resets and kicks")
-    add("--n-jobs", type=int, default=os.cpu_count() or 1, help="processes")
     add("--control-hz", type=int, default=50, help="rate of the expert and of the joint targets [Hz]")
     add("--soak-steps", type=int, default=None, help="control steps of the long walk, over all gaits; None: 35000 each")
-    add("--parts", type=Path, default=PARTS, help="folder of finished parts, from which an interrupted run goes on")
     add("--out", type=Path, default=OUT, help="file of the results; figures go beside it")
-    options = parser.parse_args(arguments)
-    number_in(options.seed, 0, 2**31 - 1, "seed")
-    number_in(options.n_jobs, 1, 1024, "n_jobs")
+    options = parse_report(parser, arguments, distinct=("tasks", "sections"))
     if options.soak_steps is not None:
         number_in(options.soak_steps, 0, 1e9, "soak_steps")
-    if len(set(options.tasks)) != len(options.tasks) or len(set(options.sections)) != len(options.sections):
-        raise InvalidInputError("a gait or section was named twice")
     return options
 
 

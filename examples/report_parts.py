@@ -1,8 +1,10 @@
 """Finished parts of a report on disk, so that Ctrl-C costs little: named by what made them, measured side by side."""
 
+import argparse
 import functools
 import hashlib
 import json
+import os
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -15,7 +17,8 @@ import joblib
 from threadpoolctl import threadpool_limits
 from tqdm.auto import tqdm
 
-from go1_mtl_gym import Go1Error
+from go1_mtl_gym.errors import Go1Error, InvalidInputError
+from go1_mtl_gym.validation import number_in
 from trainers.files import json_ready, write_json
 
 
@@ -77,6 +80,48 @@ def _shown(bar: tqdm, part: dict[str, Any]) -> dict[str, Any]:
     bar.set_postfix_str(" ".join(part[name] for name in ("section", "task", "what") if name in part))
     bar.update()
     return part
+
+
+def report_parser(description: str, parts: Path, seed: str) -> argparse.ArgumentParser:
+    """A command line with what all reports can be told; `parse_report` reads it.
+
+    Args:
+        description: of the report.
+        parts: default folder of finished parts.
+        seed: what the seed is of.
+    """
+    style = argparse.ArgumentDefaultsHelpFormatter
+    parser = argparse.ArgumentParser(description=description, formatter_class=style)
+    add = parser.add_argument
+    add("--quick", action="store_true", help="little of everything, to see that everything works")
+    add("--seed", type=int, default=1, help=seed)
+    add("--n-jobs", type=int, default=os.cpu_count() or 1, help="processes")
+    add("--parts", type=Path, default=parts, help="folder of finished parts, from which an interrupted run goes on")
+    return parser
+
+
+def parse_report(
+    parser: argparse.ArgumentParser, arguments: Sequence[str] | None, distinct: Sequence[str] = ()
+) -> argparse.Namespace:
+    """Read a report's command line.
+
+    Args:
+        parser: see `report_parser`.
+        arguments: without the program's name; None are the process's own.
+        distinct: names of lists in which nothing may stand twice.
+
+    Raises:
+        InvalidInputError: for an impossible number of processes or seed, or something that was named twice.
+    """
+    options = parser.parse_args(arguments)
+    if options.seed is not None:
+        number_in(options.seed, 0, 2**31 - 1, "seed")
+    number_in(options.n_jobs, 1, 1024, "n_jobs")
+    for name in distinct:
+        own = getattr(options, name) or []
+        if len(set(own)) != len(own):
+            raise InvalidInputError(f"something was named twice in {name}: {' '.join(map(str, own))}")
+    return options
 
 
 def exit_status(main: Callable[[list[str] | None], int]) -> Callable[[list[str] | None], int]:

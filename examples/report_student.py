@@ -14,7 +14,6 @@ measured before, and whatever student was made, is taken from --parts.
 
 import argparse
 import dataclasses
-import os
 import shlex
 import sys
 from collections.abc import Mapping, Sequence
@@ -23,7 +22,7 @@ from typing import Any
 
 from expert_report.figures import save_figure
 from publishing.runs import without_out
-from report_parts import exit_status, measure_all
+from report_parts import exit_status, measure_all, parse_report, report_parser
 from student_report.classes import changed
 from student_report.figures import FIGURES
 from student_report.lab import Walker, walkers
@@ -128,10 +127,8 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     Raises:
         InvalidInputError: for an impossible number, or something that was named twice.
     """
-    parser = argparse.ArgumentParser(
-        description="Measure a student beside the expert, one file and one figure per section.",
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
-    )
+    description = "Measure a student beside the expert, one file and one figure per section."
+    parser = report_parser(description, PARTS, seed="of commands, resets, noise and kicks")
     add = parser.add_argument
     add("sections", nargs="+", choices=tuple(SECTIONS), help="what is measured")
     add(
@@ -142,8 +139,6 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     )
     add("--tasks", nargs="+", default=None, help="gaits; None: all that the student knows")
     add("--only", nargs="+", default=None, help="parts, such as quantities, directions or gaits changed to; None: all")
-    add("--quick", action="store_true", help="few and short episodes, to see that everything works")
-    add("--seed", type=int, default=1, help="of commands, resets, noise and kicks")
     add(
         "--seeds",
         type=int,
@@ -151,17 +146,10 @@ def parse(arguments: list[str]) -> argparse.Namespace:
         default=[0, 1, 2, 3, 4],
         help="of the training of commanded's own students; ablation takes the first, others have theirs",
     )
-    add("--n-jobs", type=int, default=os.cpu_count() or 1, help="processes")
-    add("--parts", type=Path, default=PARTS, help="folder of finished parts, from which an interrupted run goes on")
     add("--out-dir", type=Path, default=OUT, help="folder of the results and figures")
-    options = parser.parse_args(arguments)
-    number_in(options.seed, 0, 2**31 - 1, "seed")
-    number_in(options.n_jobs, 1, 1024, "n_jobs")
+    options = parse_report(parser, arguments, distinct=("sections", "tasks", "only", "seeds"))
     for seed in options.seeds:
         number_in(seed, 0, 2**31 - 1, "training seed")
-    for names in (options.sections, options.tasks or [], options.only or [], options.seeds):
-        if len(set(names)) != len(names):
-            raise InvalidInputError(f"a section, gait, part or seed was named twice: {' '.join(map(str, names))}")
     needy = [name for name in options.sections if name not in OWN]
     unused = not needy and not set(BESIDE) & set(options.sections)
     if (needy and not options.policy) or (unused and options.policy):

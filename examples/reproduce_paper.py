@@ -15,7 +15,6 @@ making and nothing else.
 
 import argparse
 import dataclasses
-import os
 import shlex
 import sys
 from pathlib import Path
@@ -30,10 +29,9 @@ from paper_report.page import paper_page, score_table
 from paper_report.published import KINDS, MULTI_HEAD
 from paper_report.students import School, students, teach_all
 from publishing.runs import read_json, without_out
-from report_parts import exit_status
+from report_parts import exit_status, parse_report, report_parser
 
 import trainers
-from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import number_in
 from trainers.checkpoint import versions
 from trainers.files import write_atomically, write_json
@@ -109,10 +107,9 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     Raises:
         InvalidInputError: for an impossible number, a device that is not there, or something that was named twice.
     """
-    parser = argparse.ArgumentParser(
-        description="Make the tables of arXiv 2505.08574 with this project's expert, and show both side by side.",
-        formatter_class=argparse.ArgumentDefaultsHelpFormatter,
-    )
+    description = "Make the tables of arXiv 2505.08574 with this project's expert, and show both side by side."
+    parser = report_parser(description, PARTS, seed=f"of commands and episodes; None: {FULL.seed}")
+    parser.set_defaults(seed=None)
     add = parser.add_argument
     add("tables", nargs="+", choices=tuple(TABLES), help="which; two more are beside hardware")
     add("--kinds", nargs="+", choices=tuple(KINDS), default=list(KINDS), help="of students")
@@ -121,19 +118,11 @@ def parse(arguments: list[str]) -> argparse.Namespace:
     add("--steps", type=int, default=None, help=f"gradient steps of every training; None: {FULL.steps}")
     add("--batch-size", type=int, default=None, help=f"rows per step; None: {FULL.batch_size}")
     add("--precision", choices=tuple(PRECISIONS), default=None, help=f"of the trainings; None: {FULL.precision}")
-    add("--seed", type=int, default=None, help=f"of commands and episodes; None: {FULL.seed}")
     add("--device", default="cpu", help="of the trainings: cpu or cuda")
-    add("--n-jobs", type=int, default=os.cpu_count() or 1, help="processes, each of which makes a shard or a student")
     add("--threads", type=int, default=1, help="of each training on a CPU; changes the last digits")
-    add("--quick", action="store_true", help="few and short recordings, tiny students: to see that everything works")
-    add("--parts", type=Path, default=PARTS, help="folder of demonstrations and students, which are made once")
     add("--out-dir", type=Path, default=OUT, help="folder of paper.json, paper.md and the figures")
-    options = parser.parse_args(arguments)
-    number_in(options.n_jobs, 1, 1024, "n_jobs")
+    options = parse_report(parser, arguments, distinct=("tables", "kinds"))
     number_in(options.threads, 1, 1024, "threads")
-    for names in (options.tables, options.kinds):
-        if len(set(names)) != len(names):
-            raise InvalidInputError(f"a table or kind was named twice: {' '.join(names)}")
     check_device(options.device)
     return options
 

@@ -31,9 +31,7 @@ class FootholdRule:
         number_in(self.velocity_gain, -0.1, 1.0, "velocity_gain [s]")
         number_in(self.reach, 0.02, 0.4, "reach [m]")
 
-    def plan(
-        self, state: RobotState, com_w: np.ndarray, velocity_w: np.ndarray, touchdown_s: np.ndarray
-    ) -> np.ndarray:
+    def plan(self, state: RobotState, com_w: np.ndarray, velocity_w: np.ndarray, touchdown_s: np.ndarray) -> np.ndarray:
         """Footholds of touchdowns at given times from now.
 
         The body is taken to go on with its present velocity until the touchdown and to turn at the commanded rate.

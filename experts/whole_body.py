@@ -42,4 +42,3 @@ def joint_torques(
         acceleration = np.linalg.lstsq(system, target, rcond=None)[0]
     torque = (dynamics.mass_matrix @ acceleration + dynamics.bias - generalised)[6:]
     return np.clip(torque, -robot.TORQUE_LIMIT, robot.TORQUE_LIMIT), acceleration[6:]
-

@@ -63,7 +63,7 @@ class SoakConfig:
 
 
 def survival(lab: Lab, task: str, config: SurvivalConfig, seed: int) -> dict[str, Any]:
-    """"fixed" with the record of every episode, and "changing" with a new command every few seconds, summed up."""
+    """Record of every episode in "fixed", and, summed up, in "changing" those with a new command every few seconds."""
     fixed = lab.score(task, config.seconds, seed, config.episodes).as_dict()
     changing = lab.score(task, config.seconds, seed, config.episodes, command_interval=config.change_s).as_dict()
     return {"fixed": fixed, "changing": changing | {"episodes": config.episodes}}
