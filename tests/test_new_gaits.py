@@ -275,7 +275,7 @@ def test_parts_are_put_in_order(base, tmp_path):
 # -- The command -------------------------------------------------------------------------------------------------------
 
 
-IMPOSSIBLE = ["--gaits trot", "--gaits crawl", "--seed -1", "--n-jobs 0", "--policy nothing.zip"]
+IMPOSSIBLE = ["--gaits trot", "--gaits pace pace", "--gaits crawl", "--seed -1", "--n-jobs 0", "--policy nothing.zip"]
 
 
 @pytest.mark.parametrize("arguments", IMPOSSIBLE)
