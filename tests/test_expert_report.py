@@ -274,7 +274,9 @@ def test_a_part_has_another_name_when_anything_else_is_measured(tmp_path):
     assert part.path == dataclasses.replace(part).path
 
 
-@pytest.mark.parametrize("option", ["--seed -1", "--n-jobs 0", "--soak-steps -5", "--control-hz 300", "--tasks bound bound"])
+@pytest.mark.parametrize(
+    "option", ["--seed -1", "--n-jobs 0", "--soak-steps -5", "--control-hz 300", "--tasks bound bound"]
+)
 def test_impossible_settings_are_refused(option, tmp_path, capsys):
     out = tmp_path / "expert.json"
     arguments = ["--tasks", "trot", "--sections", "soak", "--parts", str(tmp_path / "parts"), "--out", str(out)]
