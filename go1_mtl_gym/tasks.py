@@ -77,8 +77,8 @@ _REGISTRY = {
     for task in (
         Task("trot", GAITS["trot"], command_range=(0.8, 0.3, 0.5), command_limit=(2.0, 1.0, 3.0)),
         Task("bound", GAITS["bound"], command_range=(0.5, 0.3, 0.5), command_limit=(2.1, 1.0, 3.0)),
-        Task("jump", GAITS["jump"], command_range=(0.5, 0.3, 0.5), command_limit=(1.7, 0.6, 3.0)),
-        Task("walk", GAITS["walk"], command_range=(0.5, 0.3, 0.5), command_limit=(1.1, 0.9, 2.5)),
+        Task("jump", GAITS["jump"], command_range=(0.5, 0.3, 0.5), command_limit=(1.7, 0.7, 3.0)),
+        Task("walk", GAITS["walk"], command_range=(0.5, 0.3, 0.5), command_limit=(1.1, 0.9, 2.0)),
         Task("pace", GAITS["pace"], command_range=(0.5, 0.2, 0.5), command_limit=(2.5, 1.0, 3.0)),
         Task("gallop", GAITS["gallop"], command_range=(0.5, 0.2, 0.5), command_limit=(2.5, 1.0, 3.0)),
     )

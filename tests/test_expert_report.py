@@ -23,6 +23,7 @@ from expert_report import parts as expert_parts  # noqa: E402
 from expert_report import steady as expert_steady  # noqa: E402
 from expert_report import timing as expert_timing  # noqa: E402
 
+CARD = ROOT / "docs" / "results" / "expert.json"
 HOP = Gait("hop", period=0.4, duty=0.5, offsets=(0.0, 0.0, 0.0, 0.0))
 
 
@@ -263,6 +264,14 @@ def test_the_page_shows_every_section(quick):
     for title in ("prototype", "Largest commands", "Kicks", "Steady walking", "Settings compared", "Time", "long walk"):
         assert title in page
     assert "](expert_contacts.png)" in page and "**miss**" in page and "1000000 steps" in page
+
+
+@pytest.mark.parametrize("task", json.loads(CARD.read_text())["tasks"])
+def test_the_environment_accepts_what_the_published_card_says_is_survived(task):
+    axes = json.loads(CARD.read_text())["report"]["limits"][task]
+    survived = {axis: figures["survived"] for axis, figures in axes.items()}
+    ahead = min(survived["vx"], survived["-vx"])
+    assert TASKS[task].command_limit == (ahead, survived["vy"], survived["yaw"])
 
 
 def test_a_part_has_another_name_when_anything_else_is_measured(tmp_path):
