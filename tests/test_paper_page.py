@@ -210,3 +210,12 @@ def test_the_loss_figure_has_a_line_per_student():
         np.testing.assert_array_equal(ax.lines[0].get_ydata(), [0.1, 0.001])
     assert [line.get_linestyle() for line in figure.axes[0].lines] == ["-", "-", "--"]
     assert len(figure.legends[0].get_texts()) == 2
+
+
+def test_a_long_legend_is_broken_into_lines():
+    own = [student(kind, width=width) for kind in ("multi_head", "pooled") for width in (512, 2560)]
+    figure = paper_figures.loss_figure(own, ("trot", "bound"))
+    (legend,) = figure.legends
+    assert len(legend.texts) == 4 and legend.get_window_extent().width <= figure.bbox.width
+    (single,) = paper_figures.loss_figure(own[::2], ("trot", "bound")).legends
+    assert single.get_window_extent().height < 0.75 * legend.get_window_extent().height

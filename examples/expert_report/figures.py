@@ -1,5 +1,6 @@
 """Pictures of the report card. Each takes what ``expert.json`` holds and gives a figure on an Agg canvas."""
 
+import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -156,12 +157,18 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def legend(figure: Figure, axes: Any) -> None:
-    """One legend for all panels, above them."""
+    """One legend for all panels, above them, in as few lines as fit into the figure's width."""
     found: dict[str, Any] = {}
     for ax in axes:
         for handle, label in zip(*ax.get_legend_handles_labels()):
             found.setdefault(label, handle)
-    figure.legend(found.values(), found.keys(), loc="outside upper center", ncols=len(found), fontsize=9, frameon=False)
+    for lines in range(1, len(found) + 1):
+        columns = math.ceil(len(found) / lines)
+        own = {"loc": "outside upper center", "ncols": columns, "fontsize": 9, "frameon": False}
+        shown = figure.legend(found.values(), found.keys(), **own)
+        if columns == 1 or shown.get_window_extent().width <= figure.bbox.width:
+            return
+        shown.remove()
 
 
 FIGURES: dict[str, tuple[str, Callable[[Mapping[str, Any]], Figure]]] = {
