@@ -105,7 +105,7 @@ def test_impossible_settings_are_refused(change):
 
 def test_a_named_command_beyond_the_limit_is_refused():
     with pytest.raises(InvalidInputError, match="jump"):
-        paper_config.Table("a", "simulation", ("jump",), {}, {"jump": (0.6, 0.7, 0.0)})
+        paper_config.Table("a", "simulation", ("jump",), {}, {"jump": (0.6, 0.9, 0.0)})
 
 
 def test_commands_are_named_for_all_gaits_or_none():
