@@ -13,6 +13,9 @@ from go1_mtl_gym.realism import Realism
 from go1_mtl_gym.simulation import Simulation
 from go1_mtl_gym.state_estimator import StateEstimator, StateEstimatorConfig
 
+EXPERTS_ALONE = ("estimator_noise", "state_estimator")
+"""Arguments of `go1_mtl_gym.Go1Env` that only its expert notices."""
+
 
 @dataclass(frozen=True)
 class Conditions:

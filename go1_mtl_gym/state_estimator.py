@@ -75,16 +75,16 @@ class StateEstimator:
         self._velocity_w = np.zeros(3)  # likewise
         self._covariance = _SETTLED * np.eye(4)  # of velocity and height
         self._standing_s = np.zeros(4)
-        self._readings = dict(readings)
+        self._readings = readings
 
     def update(self, readings: Mapping[str, np.ndarray], seconds: float) -> None:
         """Take in the next readings.
 
         Args:
-            readings: "accelerometer", "gyroscope", "q", "dq" and "contacts", as in the observation.
+            readings: "accelerometer", "gyroscope", "q", "dq" and "contacts", as in the observation; kept as they are.
             seconds: since the last ones [s].
         """
-        before, self._readings = self._readings, dict(readings)
+        before, self._readings = self._readings, readings
         omega, force = ((before[name] + readings[name]) / 2 for name in ("gyroscope", "accelerometer"))
         self._predict(omega, force, seconds)
         on_ground = readings["contacts"] > 0.5

@@ -9,6 +9,7 @@ import numpy as np
 
 from experts import HARDWARE_LIKE
 from go1_mtl_gym import TASKS, EstimatorNoise
+from go1_mtl_gym.conditions import EXPERTS_ALONE
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import finite_vector, number_in, one_of
 from trainers import BCConfig
@@ -21,8 +22,6 @@ PRECISIONS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
 )
 """Name -> how `trainers.BCConfig` asks for it. "medium" multiplies matrices in bfloat16 and keeps float32 between them,
 "bfloat16" computes all of the network in it; weights, loss and measurements are float32 in all of them."""
-EXPERTS_ALONE = ("estimator_noise", "state_estimator")
-"""Arguments of `go1_mtl_gym.Go1Env` that only its expert notices."""
 MOST_COMMANDS = 100
 """Most commands of one use; their seeds stand this far apart."""
 

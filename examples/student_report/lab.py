@@ -8,6 +8,7 @@ from typing import Any
 
 import trainers
 from go1_mtl_gym import TASKS
+from go1_mtl_gym.conditions import EXPERTS_ALONE
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.realism import Realism
 from trainers.metrics import wilson_interval
@@ -16,7 +17,7 @@ EXPERT = "expert"
 SHARED = ("tasks", "control_hz", "kp", "kd")
 """Arguments of the students' environments that the expert's has as well; the others shape what only students see."""
 
-WORLD = ("randomization", "noise", "estimator_noise", "state_estimator", *(each.name for each in fields(Realism)))
+WORLD = ("randomization", "noise", *EXPERTS_ALONE, *(each.name for each in fields(Realism)))
 """Arguments in which the environment that a student was trained in may differ; here all walk in the model's world."""
 
 
