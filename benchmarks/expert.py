@@ -22,11 +22,11 @@ from threadpoolctl import threadpool_limits
 
 from experts import MPCConfig, NMPCConfig, NMPCExpert
 from go1_mtl_gym import TASKS, Go1Env, Go1Error
-from go1_mtl_gym.state import RobotState
+from go1_mtl_gym.sensing.state import RobotState
 from go1_mtl_gym.validation import number_in
-from trainers.checkpoint import versions
-from trainers.files import write_json
-from trainers.report import benchmark_table
+from trainers.policies.checkpoint import versions
+from trainers.utils.files import write_json
+from trainers.utils.report import benchmark_table
 
 OURS = "ours, osqp"
 EXACT = ("daqp", "piqp")

@@ -9,7 +9,7 @@ import numpy as np
 
 from experts.model import to_pinocchio
 from go1_mtl_gym import Gait
-from go1_mtl_gym.state import RobotState
+from go1_mtl_gym.sensing.state import RobotState
 
 
 class MissingPeer(Exception):

@@ -24,9 +24,9 @@ from training_parts.settings import QUICK, Settings, machine
 from training_parts.timing import Heat, run
 
 from go1_mtl_gym import Go1Error
-from trainers.checkpoint import versions
-from trainers.files import json_ready, write_json
-from trainers.report import training_table
+from trainers.policies.checkpoint import versions
+from trainers.utils.files import json_ready, write_json
+from trainers.utils.report import training_table
 
 SECTIONS: dict[str, tuple[str, Callable[[Settings], Iterator[Heat]]]] = {
     "step": ("gradient steps", steps.step),

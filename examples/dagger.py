@@ -31,8 +31,8 @@ from tqdm.auto import tqdm
 
 import trainers
 from go1_mtl_gym import Go1Error, InvalidInputError
-from trainers.checkpoint import versions
-from trainers.files import json_ready, write_json
+from trainers.policies.checkpoint import versions
+from trainers.utils.files import json_ready, write_json
 
 BASELINES = ("pooled", "paper_literal")
 

@@ -25,9 +25,9 @@ from publishing.runs import without_out
 from report_parts import exit_status, measure_all, parse_report, report_parser
 from student_report.lab import Walker
 
-from trainers.checkpoint import load, versions
-from trainers.files import write_json
-from trainers.pretrained import FOLDER
+from trainers.policies.checkpoint import load, versions
+from trainers.policies.pretrained import FOLDER
+from trainers.utils.files import write_json
 
 OUT = Path("docs/results")
 PARTS = Path("runs/new_gaits")

@@ -32,7 +32,7 @@ from publishing.text import (
 from student_report.page import student_block
 
 from go1_mtl_gym.errors import InvalidInputError
-from trainers.files import write_atomically
+from trainers.utils.files import write_atomically
 
 ROOT = Path(__file__).resolve().parents[1]
 

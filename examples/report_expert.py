@@ -24,8 +24,8 @@ from report_parts import exit_status, measure_all, parse_report, report_parser
 
 from go1_mtl_gym import TASKS
 from go1_mtl_gym.validation import number_in
-from trainers.checkpoint import versions
-from trainers.files import write_json
+from trainers.policies.checkpoint import versions
+from trainers.utils.files import write_json
 
 OUT = Path("docs/results/expert.json")
 PARTS = Path("runs/expert")

@@ -19,7 +19,7 @@ from tqdm.auto import tqdm
 
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
 from go1_mtl_gym.validation import number_in
-from trainers.files import json_ready, write_json
+from trainers.utils.files import json_ready, write_json
 
 
 class Part(Protocol):

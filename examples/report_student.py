@@ -33,8 +33,8 @@ from student_report.school import teach_all
 
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import number_in, one_of
-from trainers.checkpoint import versions
-from trainers.files import write_json
+from trainers.policies.checkpoint import versions
+from trainers.utils.files import write_json
 
 OUT = Path("docs/results")
 PARTS = Path("runs/student")

@@ -33,8 +33,8 @@ from report_parts import exit_status, parse_report, report_parser
 
 import trainers
 from go1_mtl_gym.validation import number_in
-from trainers.checkpoint import versions
-from trainers.files import write_atomically, write_json
+from trainers.policies.checkpoint import versions
+from trainers.utils.files import write_atomically, write_json
 
 OUT = Path("docs/results")
 PARTS = Path("runs/paper")

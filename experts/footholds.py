@@ -8,7 +8,7 @@ from numba import njit
 from experts.planar import to_complex
 from go1_mtl_gym import robot
 from go1_mtl_gym.gaits import Gait
-from go1_mtl_gym.state import RobotState
+from go1_mtl_gym.sensing.state import RobotState
 from go1_mtl_gym.validation import number_in
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from go1_mtl_gym import robot
-from go1_mtl_gym.state import RobotState
+from go1_mtl_gym.sensing.state import RobotState
 
 
 @dataclass(frozen=True)

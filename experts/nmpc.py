@@ -43,7 +43,7 @@ from experts.whole_body import joint_torques
 from experts.whole_body_qp import WholeBodyQP
 from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PDGains
-from go1_mtl_gym.state import RobotState
+from go1_mtl_gym.sensing.state import RobotState
 from go1_mtl_gym.validation import number_in, one_of
 
 WHOLE_BODY = {

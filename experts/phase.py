@@ -31,7 +31,7 @@ from experts.planar import carried, to_complex, turn
 from experts.swing import SwingRule, cubic, hump
 from go1_mtl_gym import robot
 from go1_mtl_gym.gaits import Gait
-from go1_mtl_gym.state import RobotState
+from go1_mtl_gym.sensing.state import RobotState
 
 LAG_S, TRAIL_S = 0.005, 0.02
 """By how much feet follow their plan late [s], and what they tread behind it, per speed of the body [m per m/s]."""

@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit
 
 from experts.nominal import NominalMotion
-from go1_mtl_gym.state import RobotState
+from go1_mtl_gym.sensing.state import RobotState
 
 
 def body_reference(

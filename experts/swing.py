@@ -9,7 +9,7 @@ from experts.footholds import FootholdRule
 from experts.model import Dynamics
 from experts.planar import to_complex
 from go1_mtl_gym import robot
-from go1_mtl_gym.state import RobotState
+from go1_mtl_gym.sensing.state import RobotState
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import numpy as np
 
 from experts.dynamics import COM, FORCE_UNIT, OMEGA, RPY, VELOCITY
 from go1_mtl_gym.gaits import Gait
-from go1_mtl_gym.state import RobotState
+from go1_mtl_gym.sensing.state import RobotState
 
 
 class Frame:

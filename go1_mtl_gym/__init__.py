@@ -9,15 +9,15 @@ from importlib.metadata import PackageNotFoundError, version
 
 from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
-from go1_mtl_gym.estimator import EstimatorNoise
 from go1_mtl_gym.gaits import GAITS, Gait
-from go1_mtl_gym.observation import ObservationLayout, SensorNoise
-from go1_mtl_gym.perturbation import PerturbationWrapper
-from go1_mtl_gym.randomization import DomainRandomization
 from go1_mtl_gym.registration import env_id, register_built_in, register_task
-from go1_mtl_gym.state import RobotState
-from go1_mtl_gym.state_estimator import StateEstimatorConfig
+from go1_mtl_gym.sensing.observation import ObservationLayout, SensorNoise
+from go1_mtl_gym.sensing.state import RobotState
+from go1_mtl_gym.sensing.state_estimator import StateEstimatorConfig
+from go1_mtl_gym.sensing.state_noise import EstimatorNoise
+from go1_mtl_gym.sim.domain_randomization import DomainRandomization
 from go1_mtl_gym.tasks import PAPER_TASKS, TASKS, Task
+from go1_mtl_gym.wrappers import PerturbationWrapper
 
 __all__ = [
     "GAITS",

@@ -8,12 +8,12 @@ import numpy as np
 
 from go1_mtl_gym.conditions import Conditions
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.estimator import EstimatorNoise
-from go1_mtl_gym.observation import SensorNoise
-from go1_mtl_gym.randomization import DomainRandomization
-from go1_mtl_gym.realism import Realism
-from go1_mtl_gym.simulation import PHYSICS_HZ
-from go1_mtl_gym.state_estimator import StateEstimatorConfig
+from go1_mtl_gym.sensing.observation import SensorNoise
+from go1_mtl_gym.sensing.state_estimator import StateEstimatorConfig
+from go1_mtl_gym.sensing.state_noise import EstimatorNoise
+from go1_mtl_gym.sim.domain_randomization import DomainRandomization
+from go1_mtl_gym.sim.physics_params import Realism
+from go1_mtl_gym.sim.simulation import PHYSICS_HZ
 from go1_mtl_gym.tasks import TASKS
 from go1_mtl_gym.validation import number_in, one_of
 

@@ -6,12 +6,12 @@ import numpy as np
 
 from go1_mtl_gym.episode import Episode
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.estimator import EstimatorError, EstimatorNoise
-from go1_mtl_gym.observation import SensorNoise
-from go1_mtl_gym.randomization import DomainRandomization
-from go1_mtl_gym.realism import Realism
-from go1_mtl_gym.simulation import Simulation
-from go1_mtl_gym.state_estimator import StateEstimator, StateEstimatorConfig
+from go1_mtl_gym.sensing.observation import SensorNoise
+from go1_mtl_gym.sensing.state_estimator import StateEstimator, StateEstimatorConfig
+from go1_mtl_gym.sensing.state_noise import EstimatorError, EstimatorNoise
+from go1_mtl_gym.sim.domain_randomization import DomainRandomization
+from go1_mtl_gym.sim.physics_params import Realism
+from go1_mtl_gym.sim.simulation import Simulation
 
 EXPERTS_ALONE = ("estimator_noise", "state_estimator")
 """Arguments of `go1_mtl_gym.Go1Env` that only its expert notices."""

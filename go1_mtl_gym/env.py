@@ -13,16 +13,16 @@ from gymnasium.spaces import Box
 from go1_mtl_gym import arguments, robot
 from go1_mtl_gym.actuation import ActionMap, PDGains
 from go1_mtl_gym.episode import Episode
-from go1_mtl_gym.estimator import EstimatorNoise
-from go1_mtl_gym.expert_hook import DEFAULT_EXPERT, check_expert, load_expert
-from go1_mtl_gym.observation import ObservationLayout, SensorNoise
-from go1_mtl_gym.observer import Observer
-from go1_mtl_gym.randomization import DomainRandomization
-from go1_mtl_gym.realism import Realism
+from go1_mtl_gym.expert import DEFAULT_EXPERT, check_expert, load_expert
 from go1_mtl_gym.registration import register_task
-from go1_mtl_gym.simulation import PHYSICS_HZ, Simulation
-from go1_mtl_gym.state import RobotState
-from go1_mtl_gym.state_estimator import StateEstimatorConfig
+from go1_mtl_gym.sensing.observation import ObservationLayout, SensorNoise
+from go1_mtl_gym.sensing.state import RobotState
+from go1_mtl_gym.sensing.state_estimator import StateEstimatorConfig
+from go1_mtl_gym.sensing.state_noise import EstimatorNoise
+from go1_mtl_gym.sensors import Observer
+from go1_mtl_gym.sim.domain_randomization import DomainRandomization
+from go1_mtl_gym.sim.physics_params import Realism
+from go1_mtl_gym.sim.simulation import PHYSICS_HZ, Simulation
 from go1_mtl_gym.tasks import TASKS, Task, check_task_names
 from go1_mtl_gym.termination import how_it_ended
 from go1_mtl_gym.validation import finite_vector, number_in, one_of
@@ -35,7 +35,7 @@ class Go1Env(gymnasium.Env):
     """A Unitree Go1 that moves in the gait of a task, as told by a command.
 
     Observation: a flat float32 Box of 34 raw proprioceptive numbers, the channels asked for, and the one-hot task id;
-    the table is in `go1_mtl_gym.observation`.
+    the table is in `go1_mtl_gym.sensing.observation`.
 
     Action: Box(-1, 1, (12,)), an affine map (`action_map`) of 12 desired joint positions, legs FL FR RL RR, joints hip
     thigh calf. Actuators apply tau = kp (a - q) - kd v at 1 kHz, clipped at 23.7, 23.7, 35.55 N m.

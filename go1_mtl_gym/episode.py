@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from go1_mtl_gym.clock import next_phase, passes
-from go1_mtl_gym.estimator import EstimatorError
-from go1_mtl_gym.observation import SensorNoise
 from go1_mtl_gym.rewards import reward_terms
-from go1_mtl_gym.state import RobotState
-from go1_mtl_gym.state_estimator import StateEstimator
+from go1_mtl_gym.sensing.observation import SensorNoise
+from go1_mtl_gym.sensing.state import RobotState
+from go1_mtl_gym.sensing.state_estimator import StateEstimator
+from go1_mtl_gym.sensing.state_noise import EstimatorError
 from go1_mtl_gym.tasks import Task
 
 COMMAND_FILTER_S = 0.2

@@ -8,8 +8,8 @@ import numpy as np
 
 from go1_mtl_gym.errors import Go1Error
 from go1_mtl_gym.robot import FOOT_RADIUS
-from go1_mtl_gym.simulation import Simulation
-from go1_mtl_gym.state import RobotState
+from go1_mtl_gym.sensing.state import RobotState
+from go1_mtl_gym.sim.simulation import Simulation
 
 CAMERA = "track"
 COMMAND_COLOUR = (0.15, 0.75, 0.30, 0.9)

@@ -1,6 +1,6 @@
 """When an episode is over."""
 
-from go1_mtl_gym.state import RobotState
+from go1_mtl_gym.sensing.state import RobotState
 
 FALLEN_HEIGHT = 0.14
 """A trunk lower than this has fallen [m]."""

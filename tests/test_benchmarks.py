@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from trainers.report import benchmark_table
+from trainers.utils.report import benchmark_table
 
 ROOT = Path(__file__).resolve().parents[1]
 

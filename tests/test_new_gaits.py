@@ -255,7 +255,11 @@ def test_policies_without_heads_or_with_memory_are_refused(tmp_path):
     frames = dataclasses.replace(job, history=2)
     new_policy(job, job.env_kwargs, pooled=True).save(tmp_path / "pooled.zip")
     new_policy(frames, frames.env_kwargs).save(tmp_path / "frames.zip")
-    for path in (tmp_path / "pooled.zip", tmp_path / "frames.zip", trainers.pretrained.FOLDER / "clockless.zip"):
+    for path in (
+        tmp_path / "pooled.zip",
+        tmp_path / "frames.zip",
+        trainers.policies.pretrained.FOLDER / "clockless.zip",
+    ):
         with pytest.raises(InvalidInputError, match="head per gait"):
             gait_parts.learnable(Walker.student("base", path))
 

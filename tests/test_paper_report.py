@@ -21,7 +21,7 @@ from paper_report import page as paper_page  # noqa: E402
 from paper_report import published as paper_published  # noqa: E402
 from paper_report import sums as paper_sums  # noqa: E402
 
-from trainers.report import PAPER_R2  # noqa: E402
+from trainers.utils.report import PAPER_R2  # noqa: E402
 
 TABLE = paper_config.Table(
     "simulation", "simulation", ("trot", "bound"), {"control_hz": 50}, dict.fromkeys(("trot", "bound"), (0.5, 0.2, 0.0))

@@ -10,7 +10,8 @@ import pytest
 from experts import MPCConfig
 from go1_mtl_gym import clock, episode, robot, termination
 from go1_mtl_gym import env as environment
-from trainers import MultiHeadPolicy, make_env, scoring
+from trainers import MultiHeadPolicy, make_env
+from trainers.evaluation import scoring
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -123,7 +124,7 @@ def test_the_table_of_options_lists_every_argument_with_its_default():
 
 
 def test_the_table_of_parts_agrees_with_the_layout():
-    from go1_mtl_gym.observation import CHANNELS, PROPRIOCEPTION
+    from go1_mtl_gym.sensing.observation import CHANNELS, PROPRIOCEPTION
 
     rows = re.findall(r"^\| `(\w+)` \| (\d+) \| (always|channel) \|", README, re.MULTILINE)
     assert {name: int(size) for name, size, there in rows if there == "always"} == dict(PROPRIOCEPTION)

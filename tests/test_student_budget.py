@@ -31,7 +31,7 @@ TINY = dataclasses.replace(
 
 def pooled(succeeded, survived=20, trials=20, error=0.1):
     rate = succeeded / trials
-    interval = trainers.metrics.wilson_interval(succeeded, trials)
+    interval = trainers.evaluation.metrics.wilson_interval(succeeded, trials)
     counts = {"succeeded": succeeded, "survived": survived, "trials": trials, "velocity_error": error}
     return counts | {"success_rate": rate, "success_interval": interval}
 
@@ -79,7 +79,7 @@ def test_nobody_is_disturbed_but_as_said_and_budgets_are_nested():
 
 
 def test_a_shard_of_a_budget_is_no_longer_than_an_episode():
-    assert student_budget.BudgetConfig().job.shard_s <= trainers.collection.EPISODE_S  # or falls are miscounted
+    assert student_budget.BudgetConfig().job.shard_s <= trainers.data.collection.EPISODE_S  # or falls are miscounted
 
 
 # -- Lessons -----------------------------------------------------------------------------------------------------------

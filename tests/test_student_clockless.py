@@ -11,9 +11,9 @@ import torch
 
 import trainers
 from go1_mtl_gym import InvalidInputError
-from go1_mtl_gym.observation import ObservationLayout
-from trainers.clockless import clockless_layout
-from trainers.phase import phase_distance
+from go1_mtl_gym.sensing.observation import ObservationLayout
+from trainers.policies.phase_estimator import phase_distance
+from trainers.policies.phase_free import clockless_layout
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "examples"))
@@ -107,7 +107,7 @@ def test_a_clock_without_memory_is_the_estimate_and_one_with_memory_starts_at_0(
     direct = student_phase.running_phase(policy)(rows, TINY.layout)
     np.testing.assert_allclose(direct, policy.estimator.estimate(seen.obs), atol=1e-5)
     slow = student_phase.with_correction(policy, 1e-6)
-    turn = 1.0 / (50 * trainers.clockless.TASKS["trot"].gait.period)
+    turn = 1.0 / (50 * trainers.policies.phase_free.TASKS["trot"].gait.period)
     moving = dataclasses.replace(rows, obs=rows.obs + np.where(np.arange(TINY.layout.size) == 34, 0.3, 0.0))
     expected = circle(turn * np.arange(5))
     np.testing.assert_allclose(student_phase.running_phase(slow)(moving, TINY.layout), expected, atol=1e-4)
@@ -191,7 +191,7 @@ def test_finished_students_are_measured_with_each_correction_and_others_refused(
 
 def figures(succeeded, phase=None):
     own = {"succeeded": succeeded, "survived": 20, "trials": 20, "success_rate": succeeded / 20}
-    own |= {"success_interval": trainers.metrics.wilson_interval(succeeded, 20), "velocity_error": 0.05}
+    own |= {"success_interval": trainers.evaluation.metrics.wilson_interval(succeeded, 20), "velocity_error": 0.05}
     return {"walking": own, "noisy": own, "switching": None, "tasks": {"trot": own}, "phase": phase}
 
 

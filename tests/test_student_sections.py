@@ -13,9 +13,9 @@ import trainers
 from go1_mtl_gym import TASKS, robot
 from go1_mtl_gym.actuation import ActionMap, PDGains
 from go1_mtl_gym.env import Go1Env
-from go1_mtl_gym.estimator import EstimatorNoise
-from go1_mtl_gym.observation import SensorNoise
-from trainers.metrics import wilson_interval
+from go1_mtl_gym.sensing.observation import SensorNoise
+from go1_mtl_gym.sensing.state_noise import EstimatorNoise
+from trainers.evaluation.metrics import wilson_interval
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "examples"))

@@ -12,7 +12,7 @@ import torch
 
 from go1_mtl_gym.errors import InvalidInputError
 from trainers import BCConfig, BCTrainer, TensorBatches
-from trainers.report import training_table
+from trainers.utils.report import training_table
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / "benchmarks"))

@@ -8,79 +8,79 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from trainers.batches import TensorBatches
-    from trainers.bc import BCConfig, BCHistory, BCTrainer, train_bc
-    from trainers.checkpoint import CheckpointError, load
-    from trainers.clockless import ClocklessPolicy, learn_without_clock
-    from trainers.collection import CollectJob, ShardMismatchError, collect, collect_all, watch
-    from trainers.collector import BlockCollector
-    from trainers.dagger import DAggerConfig, DAggerTrainer
-    from trainers.dataset import Demonstrations
-    from trainers.environments import PerturbationConfig, make_env, make_venv
-    from trainers.evaluation import evaluate
-    from trainers.expert_policy import ExpertPolicy
-    from trainers.figures import joint_target_figure
-    from trainers.learner import Learner
-    from trainers.losses import MultiTaskLoss
-    from trainers.metrics import offline_metrics
-    from trainers.new_task import closest_task, learn_task
-    from trainers.phase import PhaseConfig, PhaseEstimator, phase_errors, train_phase
-    from trainers.policy import MultiHeadPolicy
-    from trainers.pretrained import load_pretrained
-    from trainers.recording import record_frames, save_gif, tile
-    from trainers.report import paper_table, results_table
-    from trainers.scoring import ClosedLoopResult, EpisodeRecord
-    from trainers.switching import evaluate_switch
-    from trainers.tensorboard import log_figure, log_round, log_text, make_logger
+    from trainers.algorithms.add_task import closest_task, learn_task
+    from trainers.algorithms.bc import BCConfig, BCHistory, BCTrainer, train_bc
+    from trainers.algorithms.dagger import DAggerConfig, DAggerTrainer
+    from trainers.algorithms.dagger_collector import BlockCollector
+    from trainers.algorithms.losses import MultiTaskLoss
+    from trainers.data.batches import TensorBatches
+    from trainers.data.collection import CollectJob, ShardMismatchError, collect, collect_all, watch
+    from trainers.data.demonstrations import Demonstrations
+    from trainers.data.environments import PerturbationConfig, make_env, make_venv
+    from trainers.evaluation.closed_loop import evaluate
+    from trainers.evaluation.figures import joint_target_figure
+    from trainers.evaluation.gait_transitions import evaluate_switch
+    from trainers.evaluation.metrics import offline_metrics
+    from trainers.evaluation.scoring import ClosedLoopResult, EpisodeRecord
+    from trainers.evaluation.video import record_frames, save_gif, tile
+    from trainers.policies.checkpoint import CheckpointError, load
+    from trainers.policies.expert_policy import ExpertPolicy
+    from trainers.policies.multi_head import MultiHeadPolicy
+    from trainers.policies.phase_estimator import PhaseConfig, PhaseEstimator, phase_errors, train_phase
+    from trainers.policies.phase_free import ClocklessPolicy, learn_without_clock
+    from trainers.policies.pretrained import load_pretrained
+    from trainers.policies.stateful import Learner
+    from trainers.utils.logging import log_figure, log_round, log_text, make_logger
+    from trainers.utils.report import paper_table, results_table
 
 _HOME = {
-    "BCConfig": "bc",
-    "BCHistory": "bc",
-    "BCTrainer": "bc",
-    "BlockCollector": "collector",
-    "CheckpointError": "checkpoint",
-    "ClocklessPolicy": "clockless",
-    "ClosedLoopResult": "scoring",
-    "CollectJob": "collection",
-    "DAggerConfig": "dagger",
-    "DAggerTrainer": "dagger",
-    "Demonstrations": "dataset",
-    "EpisodeRecord": "scoring",
-    "ExpertPolicy": "expert_policy",
-    "Learner": "learner",
-    "MultiHeadPolicy": "policy",
-    "MultiTaskLoss": "losses",
-    "PerturbationConfig": "environments",
-    "PhaseConfig": "phase",
-    "PhaseEstimator": "phase",
-    "ShardMismatchError": "collection",
-    "TensorBatches": "batches",
-    "closest_task": "new_task",
-    "collect": "collection",
-    "collect_all": "collection",
-    "evaluate": "evaluation",
-    "evaluate_switch": "switching",
-    "joint_target_figure": "figures",
-    "learn_task": "new_task",
-    "learn_without_clock": "clockless",
-    "load": "checkpoint",
-    "load_pretrained": "pretrained",
-    "log_figure": "tensorboard",
-    "log_round": "tensorboard",
-    "log_text": "tensorboard",
-    "make_env": "environments",
-    "make_logger": "tensorboard",
-    "make_venv": "environments",
-    "offline_metrics": "metrics",
-    "paper_table": "report",
-    "phase_errors": "phase",
-    "record_frames": "recording",
-    "results_table": "report",
-    "save_gif": "recording",
-    "tile": "recording",
-    "train_bc": "bc",
-    "train_phase": "phase",
-    "watch": "collection",
+    "BCConfig": "algorithms.bc",
+    "BCHistory": "algorithms.bc",
+    "BCTrainer": "algorithms.bc",
+    "BlockCollector": "algorithms.dagger_collector",
+    "CheckpointError": "policies.checkpoint",
+    "ClocklessPolicy": "policies.phase_free",
+    "ClosedLoopResult": "evaluation.scoring",
+    "CollectJob": "data.collection",
+    "DAggerConfig": "algorithms.dagger",
+    "DAggerTrainer": "algorithms.dagger",
+    "Demonstrations": "data.demonstrations",
+    "EpisodeRecord": "evaluation.scoring",
+    "ExpertPolicy": "policies.expert_policy",
+    "Learner": "policies.stateful",
+    "MultiHeadPolicy": "policies.multi_head",
+    "MultiTaskLoss": "algorithms.losses",
+    "PerturbationConfig": "data.environments",
+    "PhaseConfig": "policies.phase_estimator",
+    "PhaseEstimator": "policies.phase_estimator",
+    "ShardMismatchError": "data.collection",
+    "TensorBatches": "data.batches",
+    "closest_task": "algorithms.add_task",
+    "collect": "data.collection",
+    "collect_all": "data.collection",
+    "evaluate": "evaluation.closed_loop",
+    "evaluate_switch": "evaluation.gait_transitions",
+    "joint_target_figure": "evaluation.figures",
+    "learn_task": "algorithms.add_task",
+    "learn_without_clock": "policies.phase_free",
+    "load": "policies.checkpoint",
+    "load_pretrained": "policies.pretrained",
+    "log_figure": "utils.logging",
+    "log_round": "utils.logging",
+    "log_text": "utils.logging",
+    "make_env": "data.environments",
+    "make_logger": "utils.logging",
+    "make_venv": "data.environments",
+    "offline_metrics": "evaluation.metrics",
+    "paper_table": "utils.report",
+    "phase_errors": "policies.phase_estimator",
+    "record_frames": "evaluation.video",
+    "results_table": "utils.report",
+    "save_gif": "evaluation.video",
+    "tile": "evaluation.video",
+    "train_bc": "algorithms.bc",
+    "train_phase": "policies.phase_estimator",
+    "watch": "data.collection",
 }
 
 __all__ = [

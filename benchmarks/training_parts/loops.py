@@ -11,7 +11,7 @@ from imitation.algorithms import bc as imitation_bc
 from imitation.data.types import Transitions
 from stable_baselines3.common.policies import ActorCriticPolicy
 
-from go1_mtl_gym.observation import FRAME_SIZE
+from go1_mtl_gym.sensing.observation import FRAME_SIZE
 from trainers import BCConfig, BCTrainer, Demonstrations, MultiHeadPolicy, make_logger
 from training_parts.settings import Settings
 from training_parts.timing import RATE, WARM_UP, Stopwatch, Turn

@@ -10,9 +10,9 @@ import numpy as np
 
 from go1_mtl_gym.actuation import PDGains
 from go1_mtl_gym.robot import HOME_POSE
-from go1_mtl_gym.simulation import Simulation
+from go1_mtl_gym.sim.simulation import Simulation
 from trainers import Demonstrations, TensorBatches, collect, make_env
-from trainers.environments import derive_seed
+from trainers.data.environments import derive_seed
 from training_parts.loops import made_up
 from training_parts.settings import N_TASKS, Settings
 from training_parts.timing import RATE, Heat, Turn, seconds

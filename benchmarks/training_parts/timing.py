@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from trainers.optimization import torch_threads
+from trainers.algorithms.optimizer import torch_threads
 from training_parts.settings import Settings
 
 RATE = "samples_per_s"

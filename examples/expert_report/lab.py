@@ -12,8 +12,8 @@ import trainers
 from go1_mtl_gym import TASKS
 from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.robot import HOME_POSE
-from go1_mtl_gym.state import RobotState
-from trainers.environments import derive_seed
+from go1_mtl_gym.sensing.state import RobotState
+from trainers.data.environments import derive_seed
 
 WIDEST = (10.0, 10.0, 20.0)
 """Commands that `Course` accepts: |vx|, |vy| [m/s], |yaw rate| [rad/s]; far beyond every `Task.command_limit`."""

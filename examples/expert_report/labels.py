@@ -10,7 +10,7 @@ from experts import NMPCExpert
 from experts.model import RobotModel
 from experts.phase import fit_phase
 from go1_mtl_gym import TASKS
-from go1_mtl_gym.state import RobotState
+from go1_mtl_gym.sensing.state import RobotState
 
 
 @dataclass(frozen=True)

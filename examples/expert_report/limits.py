@@ -7,7 +7,7 @@ import numpy as np
 
 from expert_report.lab import Lab, generator
 from go1_mtl_gym import TASKS
-from trainers.environments import derive_seed
+from trainers.data.environments import derive_seed
 
 AXES = {
     "vx": (0, (1.0,), 0.2, 2.5),

@@ -5,7 +5,7 @@ from typing import Any
 
 from expert_report.bars import LABELS, NOTE, PROTOTYPE, compare, measured
 from expert_report.timing import MPC_HZ
-from trainers.report import closed_loop_table, markdown, number
+from trainers.utils.report import closed_loop_table, markdown, number
 
 CARD = (
     "gait",

@@ -17,7 +17,7 @@ from expert_report.steady import SteadyConfig, steady
 from expert_report.timing import MODE_TASKS, ModesConfig, TimingConfig, modes, timing
 from expert_report.walks import SoakConfig, SurvivalConfig, TransitionConfig, soak, survival, transitions
 from go1_mtl_gym import TASKS
-from trainers.checkpoint import versions
+from trainers.policies.checkpoint import versions
 
 
 @dataclasses.dataclass(frozen=True)

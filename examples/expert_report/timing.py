@@ -14,7 +14,7 @@ from expert_report.limits import CRUISE, PushConfig, largest_push
 from experts import NMPCConfig, NMPCExpert
 from experts.nmpc import WHOLE_BODY
 from go1_mtl_gym.actuation import PHYSICS_HZ
-from go1_mtl_gym.state import RobotState
+from go1_mtl_gym.sensing.state import RobotState
 
 MODES = {
     "default": NMPCConfig(),

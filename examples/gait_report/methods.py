@@ -15,8 +15,8 @@ from student_report.lessons import kept_policy, rows_of
 
 import trainers
 from gait_report.config import NewGaitsConfig, demonstrations, held_out
-from trainers.environments import derive_seed
-from trainers.new_task import tasks_of
+from trainers.algorithms.add_task import tasks_of
+from trainers.data.environments import derive_seed
 
 FROZEN, ASSISTED = "new head, frozen trunk", "new head, half by safe DAgger"
 TUNED, SCRATCH = "fine-tuned with rehearsal", "from scratch"

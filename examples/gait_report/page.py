@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from student_report.lab import EXPERT
 
 from gait_report.methods import BEFORE, METHODS
-from trainers.metrics import wilson_interval
-from trainers.report import markdown, number
+from trainers.evaluation.metrics import wilson_interval
+from trainers.utils.report import markdown, number
 
 COLOURS = dict(zip(METHODS, ("#2166ac", "#7570b3", "#1b9e77", "#d6604d"), strict=True))
 """Of the methods."""

@@ -23,8 +23,8 @@ from gait_report.methods import BEFORE, METHODS, REFERENCES, Lesson, rehearsal
 from go1_mtl_gym import TASKS
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import one_of
-from trainers.checkpoint import versions
-from trainers.new_task import tasks_of
+from trainers.algorithms.add_task import tasks_of
+from trainers.policies.checkpoint import versions
 
 OLD = "old gaits"
 """Stands for the gait in the part `BEFORE`."""

@@ -6,7 +6,7 @@ import os
 from typing import Any
 
 from go1_mtl_gym import PAPER_TASKS, TASKS, DomainRandomization, InvalidInputError
-from go1_mtl_gym.observation import CHANNELS
+from go1_mtl_gym.sensing.observation import CHANNELS
 from trainers import BCConfig, DAggerConfig, PerturbationConfig
 
 NOISE_RAD = 0.06

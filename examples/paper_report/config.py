@@ -13,7 +13,7 @@ from go1_mtl_gym.conditions import EXPERTS_ALONE
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import finite_vector, number_in, one_of
 from trainers import BCConfig
-from trainers.collection import EPISODE_S
+from trainers.data.collection import EPISODE_S
 
 Command = tuple[float, float, float]
 """(vx [m/s], vy [m/s], yaw rate [rad/s])."""

@@ -10,7 +10,7 @@ from report_parts import digest
 import trainers
 from go1_mtl_gym.errors import InvalidInputError
 from paper_report.config import MOST_COMMANDS, Command, PaperConfig, Table
-from trainers.environments import derive_seed
+from trainers.data.environments import derive_seed
 
 TRAIN, NAMED, UNSEEN = "train", "named", "unseen"
 """What a shard is for: training, or testing with the authors' held-out command, or with others that are held out."""

@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 
 import trainers
 from go1_mtl_gym import robot
-from go1_mtl_gym.observation import ObservationLayout
+from go1_mtl_gym.sensing.observation import ObservationLayout
 from paper_report.published import KINDS, MULTI_HEAD, POOLED
 
 COLOURS = {MULTI_HEAD: "#2166ac", POOLED: "#d6604d"}

@@ -9,7 +9,7 @@ from paper_report.config import TABLES
 from paper_report.data import NAMED, TRAIN, UNSEEN
 from paper_report.published import FIGURES, KINDS, MULTI_HEAD, POOLED, PUBLISHED
 from paper_report.sums import Estimate, Learner, learners, scores, uses, verdicts
-from trainers.report import markdown, number
+from trainers.utils.report import markdown, number
 
 TITLES = {
     "simulation": "Simulation",

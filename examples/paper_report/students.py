@@ -22,9 +22,9 @@ from paper_report.config import PRECISIONS, PaperConfig, Table
 from paper_report.data import TRAIN, PaperData
 from paper_report.published import KINDS, PER_GAIT, POOLED
 from paper_report.sums import learner_of
-from trainers.checkpoint import versions
-from trainers.files import write_json
-from trainers.optimization import torch_threads
+from trainers.algorithms.optimizer import torch_threads
+from trainers.policies.checkpoint import versions
+from trainers.utils.files import write_json
 
 UNUSED = ("steps", "seed", "log_interval", "matmul_precision", "autocast")
 """Settings of the cloning that a folder of students is not named by: files are, or they change no student."""
@@ -202,7 +202,7 @@ def curve(r2: dict[str, list[float]], rows: trainers.Demonstrations) -> dict[str
     """Mean squared error behind every R2, mse = (1 - R2) times the variance of the joints about their own means.
 
     Args:
-        r2: gait -> R2 on these rows, over the steps; see `trainers.metrics.regression_metrics`.
+        r2: gait -> R2 on these rows, over the steps; see `trainers.evaluation.metrics.regression_metrics`.
         rows: that they were measured on.
 
     Returns:

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from go1_mtl_gym.errors import InvalidInputError
-from trainers.files import write_json
-from trainers.report import results_table
+from trainers.utils.files import write_json
+from trainers.utils.report import results_table
 
 COPIED = ("joint_targets.png", "gaits.gif")
 """Files of a run that are published as they are, next to ``metrics.json``."""

@@ -11,7 +11,7 @@ from student_report.page import CHAPTERS, student_section
 
 from go1_mtl_gym import TASKS, env_id
 from publishing.runs import read_json, without_out
-from trainers.report import benchmark_table, markdown, paper_table, results_table, seconds_table, training_table
+from trainers.utils.report import benchmark_table, markdown, paper_table, results_table, seconds_table, training_table
 
 SETTINGS = {
     "control_hz": "control rate [Hz]",

@@ -12,7 +12,7 @@ from main_job.students import new_policy
 
 import trainers
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.observation import ObservationLayout, SensorNoise
+from go1_mtl_gym.sensing.observation import ObservationLayout, SensorNoise
 from student_report.lab import Walker, summary
 from student_report.lessons import Pupil, kept_policy, pooled, rows_of
 from student_report.phase import (
@@ -25,7 +25,7 @@ from student_report.phase import (
     without_asked,
 )
 from student_report.switching import SwitchingConfig
-from trainers.clockless import clockless_layout
+from trainers.policies.phase_free import clockless_layout
 
 TAUGHT, CORRECTED = "taught here", "correction {:g}"
 """Part of a variant, and part of a finished student that corrects its clock so much; see `trainers.ClocklessPolicy`."""

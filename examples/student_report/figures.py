@@ -15,7 +15,7 @@ from student_report.lessons_page import budget_figure, clockless_figure
 from student_report.pushes import PAIRS
 from student_report.robustness import QUANTITIES
 from student_report.sums import Count, Report, commanded_sums, gaits_of, seeds_of, variant_sums
-from trainers.metrics import wilson_interval
+from trainers.evaluation.metrics import wilson_interval
 
 COLOURS = ("#2166ac", "#1b9e77", "#7570b3", "#e6ab02")
 """Of the students, in turn."""

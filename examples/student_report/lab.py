@@ -10,8 +10,8 @@ import trainers
 from go1_mtl_gym import TASKS
 from go1_mtl_gym.conditions import EXPERTS_ALONE
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.realism import Realism
-from trainers.metrics import wilson_interval
+from go1_mtl_gym.sim.physics_params import Realism
+from trainers.evaluation.metrics import wilson_interval
 
 EXPERT = "expert"
 SHARED = ("tasks", "control_hz", "kp", "kd")

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from student_report.budget import drops
 from student_report.lessons import ALL
 from student_report.sums import Report, mean
-from trainers.metrics import wilson_interval
-from trainers.report import markdown, number
+from trainers.evaluation.metrics import wilson_interval
+from trainers.utils.report import markdown, number
 
 COLOURS = ("#d6604d", "#e6ab02", "#7570b3", "#1b9e77", "#2166ac")
 """Of the methods of "budget", in turn."""

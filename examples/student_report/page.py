@@ -12,8 +12,8 @@ from student_report.lab import EXPERT
 from student_report.lessons_page import budget_table, clockless_table
 from student_report.robustness import QUANTITIES
 from student_report.sums import Count, Report, commanded_sums, gaits_of, variant_sums
-from trainers.metrics import wilson_interval
-from trainers.report import markdown, number
+from trainers.evaluation.metrics import wilson_interval
+from trainers.utils.report import markdown, number
 
 
 @dataclass(frozen=True)

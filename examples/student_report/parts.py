@@ -22,8 +22,8 @@ from student_report.lab import Walker
 from student_report.pushes import KickConfig, pushes
 from student_report.robustness import RobustnessConfig, robustness
 from student_report.switching import SwitchingConfig, switching
-from trainers.checkpoint import versions
-from trainers.evaluation import controller
+from trainers.evaluation.closed_loop import controller
+from trainers.policies.checkpoint import versions
 
 SCORING = (trainers.evaluate, trainers.evaluate_switch, trainers.ClosedLoopResult, controller)
 """What stands in the files of `trainers` that a figure depends on."""

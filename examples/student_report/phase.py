@@ -8,9 +8,9 @@ import numpy as np
 from gymnasium import spaces
 
 import trainers
-from go1_mtl_gym.observation import ObservationLayout
-from trainers.clockless import student_layout
-from trainers.phase import phase_distance, unit
+from go1_mtl_gym.sensing.observation import ObservationLayout
+from trainers.policies.phase_estimator import phase_distance, unit
+from trainers.policies.phase_free import student_layout
 
 PHASE_RAD = 0.1
 """Weight of the asked phase: sine and cosine count in the loss as joints that swing by this much do [rad].

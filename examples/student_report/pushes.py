@@ -9,8 +9,8 @@ from expert_report.lab import generator
 from expert_report.limits import CRUISE, DIRECTIONS, kick_w
 
 from go1_mtl_gym import TASKS
-from trainers.environments import derive_seed, make_env
-from trainers.evaluation import controller
+from trainers.data.environments import derive_seed, make_env
+from trainers.evaluation.closed_loop import controller
 
 PAIRS = {"lateral": ("left", "right"), "fore-aft": ("forward", "backward")}
 """Directions of which the weaker one counts."""

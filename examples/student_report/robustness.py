@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import trainers
-from go1_mtl_gym.estimator import EstimatorNoise
-from go1_mtl_gym.observation import SensorNoise
+from go1_mtl_gym.sensing.observation import SensorNoise
+from go1_mtl_gym.sensing.state_noise import EstimatorNoise
 from student_report.lab import EXPERT, summary
 
 

@@ -14,8 +14,8 @@ from report_parts import digest
 from tqdm.auto import tqdm
 
 import trainers
-from trainers.files import write_json
-from trainers.optimization import torch_threads
+from trainers.algorithms.optimizer import torch_threads
+from trainers.utils.files import write_json
 
 UNUSED = ("preset", "n_envs", "device", "threads", "episodes", "video_s")
 """Settings of the main job that a lesson does not use; the others tell one student from another."""

@@ -7,7 +7,7 @@ import pytest
 from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import ActionMap, PDGains
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.simulation import Simulation
+from go1_mtl_gym.sim.simulation import Simulation
 
 GAINS = [PDGains(), PDGains(20.0, 0.5), PDGains(100.0, 5.0)]
 

@@ -8,7 +8,7 @@ import pytest
 from go1_mtl_gym import EstimatorNoise, robot
 from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.estimator import EstimatorError
+from go1_mtl_gym.sensing.state_noise import EstimatorError
 
 SILENT = EstimatorNoise(**{each.name: 0.0 for each in dataclasses.fields(EstimatorNoise)})
 EXACT = ("contacts", "gait", "phase", "command", "time_s")

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 
 from go1_mtl_gym import robot
-from go1_mtl_gym.leg_kinematics import contact_points
+from go1_mtl_gym.kinematics import contact_points
 
 
 def test_points_and_velocities_are_mujocos():

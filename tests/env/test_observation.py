@@ -9,7 +9,7 @@ import pytest
 
 from go1_mtl_gym import robot
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.observation import CHANNELS, PROPRIOCEPTION, ObservationLayout, SensorNoise
+from go1_mtl_gym.sensing.observation import CHANNELS, PROPRIOCEPTION, ObservationLayout, SensorNoise
 
 TASKS = ("trot", "bound", "jump", "walk")
 ALL = tuple(CHANNELS)

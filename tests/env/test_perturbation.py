@@ -9,7 +9,7 @@ from experts import NMPCExpert
 from go1_mtl_gym import GAITS, TASKS, PerturbationWrapper, Task, register_task, robot
 from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.perturbation import NOISE_CORRELATION_S
+from go1_mtl_gym.wrappers import NOISE_CORRELATION_S
 
 QUIET = {"noise_rad": 0.0, "kick": 0.0, "command_interval": None}
 

@@ -12,8 +12,8 @@ import pytest
 from go1_mtl_gym import DomainRandomization, SensorNoise, robot
 from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.randomization import Range
-from go1_mtl_gym.realism import Realism
+from go1_mtl_gym.sim.domain_randomization import Range
+from go1_mtl_gym.sim.physics_params import Realism
 
 RANGES = [each.name for each in dataclasses.fields(DomainRandomization) if each.type == Range]
 NOTHING = DomainRandomization(**dict.fromkeys(RANGES))

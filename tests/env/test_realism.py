@@ -8,8 +8,8 @@ from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PDGains
 from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.realism import PAYLOAD_SIDE, ActionDelay, Realism
-from go1_mtl_gym.simulation import Simulation
+from go1_mtl_gym.sim.physics_params import PAYLOAD_SIDE, ActionDelay, Realism
+from go1_mtl_gym.sim.simulation import Simulation
 
 
 def fields(model: mujoco.MjModel) -> dict[str, np.ndarray]:

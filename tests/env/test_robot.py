@@ -7,7 +7,7 @@ import pytest
 from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PDGains
 from go1_mtl_gym.env import Go1Env
-from go1_mtl_gym.simulation import Simulation
+from go1_mtl_gym.sim.simulation import Simulation
 
 
 @pytest.fixture(scope="module")

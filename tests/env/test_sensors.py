@@ -6,7 +6,7 @@ import pytest
 from go1_mtl_gym import robot
 from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.episode import COMMAND_FILTER_S
-from go1_mtl_gym.observation import SensorNoise
+from go1_mtl_gym.sensing.observation import SensorNoise
 
 ALL = ("command", "gravity", "phase", "last_action")
 

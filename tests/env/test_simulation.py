@@ -7,8 +7,8 @@ import pytest
 from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PDGains
 from go1_mtl_gym.env import Go1Env
-from go1_mtl_gym.realism import Realism
-from go1_mtl_gym.simulation import CONTACT_FORCE, PHYSICS_HZ, Simulation
+from go1_mtl_gym.sim.physics_params import Realism
+from go1_mtl_gym.sim.simulation import CONTACT_FORCE, PHYSICS_HZ, Simulation
 
 EVERYTHING = Realism(0.5, 2.0, 0.012, 0.9, 0.6, 0.02, 0.01)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from go1_mtl_gym.gaits import GAITS
-from go1_mtl_gym.state import RobotState
+from go1_mtl_gym.sensing.state import RobotState
 
 
 def state(rpy=(0.0, 0.0, 0.0), velocity=(0.0, 0.0, 0.0), omega_b=(0.0, 0.0, 0.0)) -> RobotState:

@@ -10,7 +10,7 @@ from experts import HARDWARE_LIKE
 from go1_mtl_gym import TASKS, RobotState, StateEstimatorConfig, robot
 from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.state_estimator import StateEstimator
+from go1_mtl_gym.sensing.state_estimator import StateEstimator
 
 ROBOT = {**HARDWARE_LIKE, "estimator_noise": None, "state_estimator": True}
 UP = np.array([0.0, 0.0, robot.GRAVITY])

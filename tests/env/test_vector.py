@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from go1_mtl_gym.env import Go1Env
-from trainers.environments import make_venv
+from trainers.data.environments import make_venv
 
 
 @pytest.mark.parametrize("subproc", [False, True], ids=["dummy", "subproc"])

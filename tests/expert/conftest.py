@@ -8,7 +8,7 @@ import pytest
 from experts import NMPCExpert
 from go1_mtl_gym import GAITS
 from go1_mtl_gym.env import Go1Env
-from go1_mtl_gym.state import RobotState
+from go1_mtl_gym.sensing.state import RobotState
 
 
 @dataclass(frozen=True)

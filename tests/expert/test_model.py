@@ -10,7 +10,7 @@ import pytest
 from experts.model import Dynamics, RobotModel, to_pinocchio
 from go1_mtl_gym import robot
 from go1_mtl_gym.env import Go1Env
-from go1_mtl_gym.state import RobotState
+from go1_mtl_gym.sensing.state import RobotState
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from experts.mpc import Solution
 from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PDGains
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.state import RobotState
+from go1_mtl_gym.sensing.state import RobotState
 
 PARTS = ["position_w", "quat_wxyz", "linear_velocity_w", "angular_velocity_b", "q", "v", "command"]
 

@@ -13,7 +13,7 @@ from experts.phase import LAG_S, SAMPLES, TRAIL_S, PhaseScales, _cycle, _residua
 from experts.swing import SwingRule
 from go1_mtl_gym import GAITS, robot
 from go1_mtl_gym.env import Go1Env
-from go1_mtl_gym.state import RobotState
+from go1_mtl_gym.sensing.state import RobotState
 from go1_mtl_gym.tasks import TASKS
 
 MIDDLE = (0.4, 0.1, 0.2)

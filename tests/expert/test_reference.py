@@ -8,7 +8,7 @@ import pytest
 from experts.nominal import NominalMotion, nominal_motion, standing_motion
 from experts.reference import body_reference
 from go1_mtl_gym import GAITS
-from go1_mtl_gym.state import RobotState
+from go1_mtl_gym.sensing.state import RobotState
 
 HEIGHT, DT, STEPS = 0.28, 0.025, 16
 RPY, COM, OMEGA, VELOCITY = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)

@@ -9,7 +9,7 @@ from experts import NMPCConfig, NMPCExpert, nmpc
 from experts.dynamics import COM, RPY
 from experts.nmpc import WHOLE_BODY
 from go1_mtl_gym.env import Go1Env
-from go1_mtl_gym.state import RobotState
+from go1_mtl_gym.sensing.state import RobotState
 
 REMEMBERING = {
     "shifted": NMPCConfig(linearisation="shifted", sqp_iterations=1),

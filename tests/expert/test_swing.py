@@ -9,7 +9,7 @@ from experts.footholds import FootholdRule
 from experts.model import Dynamics, RobotModel
 from experts.swing import SwingRule, cubic, hump
 from go1_mtl_gym import GAITS, robot
-from go1_mtl_gym.state import RobotState
+from go1_mtl_gym.sensing.state import RobotState
 
 EVERY = pytest.mark.parametrize("gait", GAITS.values(), ids=list(GAITS))
 VELOCITY = np.array([0.5, -0.1])

@@ -13,8 +13,8 @@ import numpy as np
 
 from go1_mtl_gym import PAPER_TASKS, TASKS, PerturbationWrapper, Task
 from go1_mtl_gym.actuation import ActionMap
-from go1_mtl_gym.observation import FRAME_SIZE, ObservationLayout
-from trainers.environments import ExpertAccess, PerturbationConfig
+from go1_mtl_gym.sensing.observation import FRAME_SIZE, ObservationLayout
+from trainers.data.environments import ExpertAccess, PerturbationConfig
 
 HIPS, THIGHS, KNEES = slice(0, 7, 3), slice(1, 12, 3), slice(2, 12, 3)
 SIZE = 34 + 3 + 2 + 12

@@ -13,7 +13,7 @@ from tests.trainer.stub_env import StubEnv
 from tests.trainer.test_clockless import rows
 from tests.trainer.test_policy import observations
 from trainers import ClocklessPolicy, MultiHeadPolicy, PhaseEstimator
-from trainers.clockless import clockless_layout
+from trainers.policies.phase_free import clockless_layout
 
 
 @pytest.fixture

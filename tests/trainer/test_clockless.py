@@ -5,10 +5,10 @@ import pytest
 
 import trainers
 from go1_mtl_gym import PAPER_TASKS
-from go1_mtl_gym.observation import ObservationLayout
+from go1_mtl_gym.sensing.observation import ObservationLayout
 from tests.trainer.stub_env import StubEnv
 from trainers import ClocklessPolicy, MultiHeadPolicy, PhaseEstimator
-from trainers.clockless import clockless_layout
+from trainers.policies.phase_free import clockless_layout
 
 CHANNELS = ("command", "phase", "last_action")
 """What the student sees."""

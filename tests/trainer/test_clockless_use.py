@@ -12,7 +12,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
 
 from go1_mtl_gym import PAPER_TASKS
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.observation import ObservationLayout
+from go1_mtl_gym.sensing.observation import ObservationLayout
 from tests.trainer.stub_env import StubEnv, linear_expert, make_stub
 from tests.trainer.test_clockless import BLIND, CHANNELS, TROT, WALK, rows
 from trainers import (
@@ -26,8 +26,8 @@ from trainers import (
     phase_errors,
     watch,
 )
-from trainers.clockless import clockless_layout
-from trainers.learner import Learner
+from trainers.policies.phase_free import clockless_layout
+from trainers.policies.stateful import Learner
 
 QUICK = PhaseConfig(steps=400, batch_size=256)
 
@@ -136,7 +136,7 @@ def test_long_walks_are_cut_into_episodes_of_their_own_seeds(monkeypatch):
         walks.append((task, seed, seconds, perturbation, kwargs["friction"]))
         return watch(policy, task, seed, 0.1, perturbation, history, make_env=kwargs["make_env"])
 
-    monkeypatch.setattr("trainers.clockless.watch", record)
+    monkeypatch.setattr("trainers.policies.phase_free.watch", record)
     learn_without_clock(expert(), 75.0, 2, config=PhaseConfig(steps=1), make_env=make_stub, friction=0.5)
     assert [walk[0] for walk in walks] == list(PAPER_TASKS) * 3
     assert {walk[2:] for walk in walks} == {(25.0, PerturbationConfig(), 0.5)} and len({walk[1] for walk in walks}) == 3

@@ -12,7 +12,7 @@ from go1_mtl_gym import TASKS, DomainRandomization
 from go1_mtl_gym.errors import InvalidInputError
 from tests.trainer.stub_env import HIPS, SIZE, THIGHS, StubEnv, make_stub
 from trainers import CollectJob, Demonstrations, PerturbationConfig, ShardMismatchError, collect, collect_all, watch
-from trainers.collection import CollectionError
+from trainers.data.collection import CollectionError
 
 LAYOUT = {"q": slice(6, 18), "command": slice(34, 37), "phase": slice(37, 39), "last_action": slice(39, 51)}
 
@@ -198,5 +198,6 @@ def test_bad_perturbation(kwargs):
 
 
 def test_collecting_does_not_load_torch():
-    code = "import sys, trainers.collection; assert not {'torch', 'imitation', 'pinocchio', 'osqp'} & set(sys.modules)"
+    forbidden = "{'torch', 'imitation', 'pinocchio', 'osqp'}"
+    code = f"import sys, trainers.data.collection; assert not {forbidden} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)

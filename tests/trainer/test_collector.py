@@ -8,7 +8,7 @@ from go1_mtl_gym.errors import InvalidInputError
 from tests.trainer.stub_env import SIZE, StubEnv
 from tests.trainer.test_collection import LAYOUT, trot_labels
 from trainers import BlockCollector, Learner
-from trainers.collector import StarvedCollectorError
+from trainers.algorithms.dagger_collector import StarvedCollectorError
 
 
 def drive(collector: BlockCollector) -> list[np.ndarray]:

@@ -74,7 +74,7 @@ def test_rows_of_rounds_weigh_more(venv, demos, policy, tmp_path):
     trainer.collect_round()
     with pytest.MonkeyPatch.context() as patch:
         given = []
-        patch.setattr("trainers.bc.TensorBatches", lambda *args: given.append(args) or TensorBatches(*args))
+        patch.setattr("trainers.algorithms.bc.TensorBatches", lambda *args: given.append(args) or TensorBatches(*args))
         trainer.train_round()
     data, weights = given[0][0], given[0][-1]
     assert len(data) == len(weights) == len(demos) + 200

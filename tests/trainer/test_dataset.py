@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.observation import ObservationLayout
+from go1_mtl_gym.sensing.observation import ObservationLayout
 from trainers import Demonstrations
 
 

@@ -10,7 +10,7 @@ from go1_mtl_gym import TASKS
 from go1_mtl_gym.errors import InvalidInputError
 from tests.trainer.stub_env import HIPS, THIGHS, StubEnv, linear_expert, make_stub
 from trainers import evaluate
-from trainers.environments import ExpertAccess
+from trainers.data.environments import ExpertAccess
 
 SHORT = {"episodes": 2, "seconds": 6.0, "make_env": make_stub}
 

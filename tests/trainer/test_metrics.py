@@ -9,8 +9,8 @@ import pytest
 from go1_mtl_gym.errors import InvalidInputError
 from tests.trainer.test_dataset import tiny
 from trainers import offline_metrics
-from trainers.files import json_ready
-from trainers.metrics import regression_metrics, touchdowns, tracking_error, wilson_interval
+from trainers.evaluation.metrics import regression_metrics, touchdowns, tracking_error, wilson_interval
+from trainers.utils.files import json_ready
 
 
 def test_regression_by_hand():

@@ -21,8 +21,8 @@ from trainers import (
     load,
     offline_metrics,
 )
-from trainers.clockless import clockless_layout
-from trainers.new_task import trunk_features
+from trainers.algorithms.add_task import trunk_features
+from trainers.policies.phase_free import clockless_layout
 
 TASKS = (*PAPER_TASKS, "pace")
 QUICK = BCConfig(steps=60, batch_size=128, learning_rate=5e-3, weight_decay=0.1, log_interval=30)

@@ -7,9 +7,9 @@ import pytest
 import torch
 
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.observation import ObservationLayout
+from go1_mtl_gym.sensing.observation import ObservationLayout
 from trainers import Demonstrations, PhaseConfig, PhaseEstimator, phase_errors, train_phase
-from trainers.phase import CLIP_SD, unit
+from trainers.policies.phase_estimator import CLIP_SD, unit
 
 TASKS = ("trot", "walk")
 SEEN = ObservationLayout(TASKS, ("command",))

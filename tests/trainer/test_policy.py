@@ -13,7 +13,7 @@ from go1_mtl_gym import TASKS
 from go1_mtl_gym.errors import InvalidInputError
 from tests.trainer.stub_env import SIZE, StubEnv
 from trainers import MultiHeadPolicy
-from trainers.networks import route
+from trainers.policies.networks import route
 
 
 def observations(tasks: list[int], seed: int = 0, n_tasks: int = 4) -> np.ndarray:

@@ -7,8 +7,9 @@ import pytest
 import trainers
 from go1_mtl_gym import PAPER_TASKS
 from go1_mtl_gym.errors import InvalidInputError
-from trainers import ClocklessPolicy, MultiHeadPolicy, pretrained
-from trainers.pretrained import FOLDER, PRETRAINED
+from trainers import ClocklessPolicy, MultiHeadPolicy
+from trainers.policies import pretrained
+from trainers.policies.pretrained import FOLDER, PRETRAINED
 
 LARGEST_BYTES = 5_000_000
 """Of all files together."""

@@ -6,7 +6,7 @@ import pytest
 
 from go1_mtl_gym.errors import InvalidInputError
 from trainers import paper_table, results_table
-from trainers.report import closed_loop_table, markdown, seconds_table
+from trainers.utils.report import closed_loop_table, markdown, seconds_table
 
 STUDENT = {
     "mse": 0.0012345,

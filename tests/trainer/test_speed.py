@@ -8,8 +8,8 @@ from go1_mtl_gym.errors import InvalidInputError
 from tests.trainer.stub_env import StubEnv
 from tests.trainer.test_policy import observations
 from trainers import BCConfig, BCTrainer, MultiHeadPolicy, MultiTaskLoss, TensorBatches
-from trainers.batches import shuffled_by_numpy, shuffled_by_torch
-from trainers.optimization import matmul_precision
+from trainers.algorithms.optimizer import matmul_precision
+from trainers.data.batches import shuffled_by_numpy, shuffled_by_torch
 
 TASKS = StubEnv().tasks
 SORTED = [0, 0, 0, 1, 3, 3]

@@ -7,7 +7,7 @@ from go1_mtl_gym import PAPER_TASKS, TASKS
 from go1_mtl_gym.errors import InvalidInputError
 from tests.trainer.stub_env import HIPS, THIGHS, StubEnv, make_stub
 from trainers import evaluate_switch
-from trainers.environments import ExpertAccess
+from trainers.data.environments import ExpertAccess
 
 SHORT = {"trials": 2, "after_s": 4.0, "make_env": make_stub}
 

@@ -1,0 +1,78 @@
+"""Physics and sensors that differ from episode to episode."""
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.sim.physics_params import Realism
+from go1_mtl_gym.validation import finite_vector, number_in
+
+Range = tuple[float, float] | None
+
+
+@dataclass(frozen=True)
+class DomainRandomization:
+    """Ranges (low, high) that an episode's figures are drawn from, uniformly; None leaves the environment's own.
+
+    Attributes:
+        friction, payload_kg, action_delay_s, motor_strength, joint_friction, rotor_inertia, contact_time_s: as in
+            `go1_mtl_gym.sim.physics_params.Realism`.
+        noise: factor on the environment's `SensorNoise`, or on the default one if the environment has none.
+        share: of the episodes that are randomised; the others are as without randomization.
+
+    Raises:
+        InvalidInputError: if a range is not low <= high, or one of its ends is an impossible figure.
+    """
+
+    friction: Range = (0.4, 1.0)
+    payload_kg: Range = (0.0, 3.0)
+    action_delay_s: Range = (0.0, 0.02)
+    motor_strength: Range = (0.9, 1.1)
+    joint_friction: Range = (0.0, 1.0)
+    rotor_inertia: Range = (0.0, 0.01)
+    contact_time_s: Range = (0.005, 0.04)
+    noise: Range = (0.0, 1.5)
+    share: float = 1.0
+
+    def __post_init__(self) -> None:
+        number_in(self.share, 0.0, 1.0, "share of randomised episodes")
+        for name, (low, high) in self._ranges().items():
+            if low > high:
+                raise InvalidInputError(f"range of {name} must be low <= high, got {(low, high)}")
+            object.__setattr__(self, name, (low, high))  # equal to what comes back from JSON
+            for end in (low, high):
+                if name == "noise":
+                    number_in(end, 0.0, 10.0, "factor on the sensor noise")
+                else:
+                    Realism(**{name: end})
+
+    def draw(self, rng: np.random.Generator, base: Realism) -> tuple[Realism, float | None]:
+        """Draw the figures of an episode; every call takes as many numbers from the generator.
+
+        Args:
+            rng: where the randomness comes from.
+            base: the environment's own figures.
+
+        Returns:
+            The physics, and the factor on the sensor noise; None leaves the noise as it is.
+        """
+        chance, *levels = rng.uniform(size=len(fields(self))).tolist()
+        if chance >= self.share:
+            return base, None
+        level = dict(zip((each.name for each in fields(self)), levels))
+        drawn = {
+            name: min(low + level[name] * (high - low), high)  # rounding must not lead beyond the end
+            for name, (low, high) in self._ranges().items()
+        }
+        factor = drawn.pop("noise", None)
+        return replace(base, **drawn), factor
+
+    def _ranges(self) -> dict[str, tuple[float, float]]:
+        """The ranges that are not None, by name."""
+        given = {each.name: getattr(self, each.name) for each in fields(self) if each.name != "share"}
+        return {
+            name: tuple(finite_vector(ends, 2, f"range of {name}").tolist())
+            for name, ends in given.items()
+            if ends is not None
+        }

@@ -1,0 +1,163 @@
+"""The robot in MuJoCo: stepping, reading and writing its state. Knows nothing of tasks, gaits or rewards."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from go1_mtl_gym import robot
+from go1_mtl_gym.actuation import PHYSICS_HZ, PDGains
+from go1_mtl_gym.sim.physics_params import CHANGED_ARRAYS, INERTIAL_ARRAYS, ActionDelay, Realism
+
+CONTACT_FORCE = 2.0
+"""A foot counts as on the ground when it presses with more than this [N]."""
+_STATE = mujoco.mjtState.mjSTATE_INTEGRATION
+_UNSTABLE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What the robot's sensors say at one instant; frames and units as in `go1_mtl_gym.sensing.observation`."""
+
+    accelerometer: np.ndarray
+    gyroscope: np.ndarray
+    contacts: np.ndarray
+
+
+class Simulation:
+    """One Go1 on flat ground with PD actuators that run inside MuJoCo at 1 kHz.
+
+    Args:
+        gains: of the PD actuators.
+        realism: what is different about the physics.
+
+    Attributes:
+        model: the MuJoCo model; private to this simulation, so it may be changed (friction, masses). Copies of an
+            environment begin with the unchanged model, and `set_realism` overwrites what it is about.
+        data: the MuJoCo data.
+        realism: what is different about the physics now.
+    """
+
+    def __init__(self, gains: PDGains, realism: Realism | None = None) -> None:
+        self.model = mujoco.MjModel.from_xml_path(robot.SCENE_PATH)
+        self.data = mujoco.MjData(self.model)
+        self.model.opt.timestep = 1.0 / PHYSICS_HZ
+        self.model.actuator_gainprm[:, 0] = gains.kp
+        self.model.actuator_biasprm[:, 1] = -gains.kp
+        self.model.actuator_biasprm[:, 2] = -gains.kd
+        self._plain = {name: getattr(self.model, name).copy() for name in CHANGED_ARRAYS}
+        self.set_realism(realism or Realism())
+        self._sensor = {
+            name: slice(start, start + size)
+            for name, start, size in (
+                (self.model.sensor(i).name, self.model.sensor_adr[i], self.model.sensor_dim[i])
+                for i in range(self.model.nsensor)
+            )
+        }
+        self._touch = np.array([self._sensor[f"{leg}_touch"].start for leg in robot.LEGS])
+        self._foot_geom = np.array([self.model.geom(f"{leg}_foot").id for leg in robot.LEGS])
+
+    def reset(self, q: np.ndarray, yaw: float = 0.0) -> None:
+        """Stand still at the world's origin in a joint position, the lowest foot touching the ground.
+
+        Args:
+            q: joint positions [rad], shape (12,); also the actuators' first target.
+            yaw: heading [rad].
+        """
+        mujoco.mj_resetData(self.model, self.data)
+        self.data.qpos[:7] = [0.0, 0.0, robot.STANDING_HEIGHT, np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)]
+        self.data.qpos[7:] = q
+        self.data.ctrl[:] = q
+        self._delay.reset(q)
+        mujoco.mj_kinematics(self.model, self.data)
+        self.data.qpos[2] -= self.feet_w[:, 2].min() - robot.FOOT_RADIUS
+        mujoco.mj_forward(self.model, self.data)
+
+    def set_realism(self, realism: Realism) -> None:
+        """Let something else be different about the physics, from the next step on.
+
+        The figures are those of the model on disk, changed by `realism` alone. Targets on their way are forgotten: the
+        actuators go on holding what they hold.
+        """
+        before = [getattr(self.model, name).copy() for name in INERTIAL_ARRAYS]
+        for name, value in self._plain.items():
+            getattr(self.model, name)[:] = value
+        realism.apply(self.model)
+        if not all(np.array_equal(getattr(self.model, name), old) for name, old in zip(INERTIAL_ARRAYS, before)):
+            mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
+        self._delay = ActionDelay(realism.delay_steps)
+        self._delay.reset(self.data.ctrl)
+        self.realism = realism
+
+    def step(self, target: np.ndarray, physics_steps: int) -> None:
+        """Command joint targets [rad], shape (12,), for a number of 1 ms steps; the delay decides when they are held.
+
+        Sensors, contacts and torques read afterwards belong to the state after the step: `mj_step` leaves those of
+        the state before it, so the forward pass is run once more.
+        """
+        for held, steps in self._delay.send(target, physics_steps):
+            self.data.ctrl[:] = held
+            mujoco.mj_step(self.model, self.data, nstep=steps)
+        mujoco.mj_forward(self.model, self.data)
+
+    def push(self, delta_velocity_w: np.ndarray) -> None:
+        """Add to the trunk's linear velocity [m/s], world frame, shape (3,), at once."""
+        self.data.qvel[:3] += delta_velocity_w
+        mujoco.mj_forward(self.model, self.data)
+
+    @property
+    def q(self) -> np.ndarray:
+        """Joint positions [rad], shape (12,)."""
+        return self.data.qpos[7:].copy()
+
+    @property
+    def v(self) -> np.ndarray:
+        """Joint velocities [rad/s], shape (12,)."""
+        return self.data.qvel[6:].copy()
+
+    @property
+    def torque(self) -> np.ndarray:
+        """Joint torques of the actuators [N m], shape (12,)."""
+        return self.data.actuator_force.copy()
+
+    @property
+    def feet_w(self) -> np.ndarray:
+        """Centres of the feet in the world [m], shape (4, 3)."""
+        return self.data.geom_xpos[self._foot_geom].copy()
+
+    @property
+    def contacts(self) -> np.ndarray:
+        """Which feet press on the ground, bool, shape (4,)."""
+        return self.data.sensordata[self._touch] > CONTACT_FORCE
+
+    @property
+    def stable(self) -> bool:
+        """False once the physics has diverged (a non-finite or huge position, velocity or acceleration)."""
+        warned = any(self.data.warning[kind].number for kind in _UNSTABLE)
+        return not warned and bool(np.isfinite(self.data.qpos).all() and np.isfinite(self.data.qvel).all())
+
+    def read(self) -> Reading:
+        """The sensors' readings, without noise."""
+        values = self.data.sensordata
+        return Reading(
+            accelerometer=values[self._sensor["accelerometer"]].copy(),
+            gyroscope=values[self._sensor["gyroscope"]].copy(),
+            contacts=self.contacts,
+        )
+
+    def snapshot(self) -> np.ndarray:
+        """Everything needed to continue to the bit, as one vector: state, targets on their way, realism."""
+        state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
+        mujoco.mj_getState(self.model, self.data, state, _STATE)
+        return np.concatenate([state, self._delay.waiting.ravel(), self.realism.as_vector()])
+
+    def restore(self, snapshot: np.ndarray) -> None:
+        """Return to a snapshot of a simulation with the same gains; its realism comes with it."""
+        size = mujoco.mj_stateSize(self.model, _STATE)
+        state, waiting, realism = np.split(snapshot, [size, len(snapshot) - len(self.realism.as_vector())])
+        if Realism.from_vector(realism) != self.realism:
+            self.set_realism(Realism.from_vector(realism))
+        mujoco.mj_setState(self.model, self.data, state, _STATE)
+        mujoco.mj_forward(self.model, self.data)
+        mujoco.mj_setState(self.model, self.data, state, _STATE)
+        self._delay.waiting = waiting.reshape(-1, 12).copy()

@@ -1,0 +1,1 @@
+"""Behavior cloning, DAgger and what else trains a policy."""

@@ -1,0 +1,286 @@
+"""Behaviour cloning on `imitation`'s trainer, with our loss, batches, optimiser and log."""
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import torch
+from imitation.algorithms import bc as imitation_bc
+from imitation.util.logger import HierarchicalLogger
+from tqdm.auto import tqdm
+
+from go1_mtl_gym.errors import Go1Error, InvalidInputError
+from trainers.algorithms import losses
+from trainers.algorithms.optimizer import PRECISIONS, adamw_one_cycle, matmul_precision
+from trainers.data.batches import TensorBatches
+from trainers.data.demonstrations import Demonstrations
+from trainers.evaluation.metrics import offline_metrics
+from trainers.policies.multi_head import MultiHeadPolicy
+from trainers.utils.logging import make_logger
+
+
+class TrainingDivergedError(Go1Error):
+    """The loss became NaN or infinite."""
+
+
+@dataclasses.dataclass(frozen=True)
+class BCConfig:
+    """How to clone.
+
+    Attributes:
+        steps: gradient steps.
+        batch_size: rows per step, shared evenly among the tasks.
+        learning_rate: peak of the one-cycle schedule.
+        warmup: share of the steps before the peak.
+        weight_decay: of AdamW.
+        max_grad_norm: gradients longer than this are shortened.
+        space: "radians" or "normalized"; see `trainers.algorithms.losses.MultiTaskLoss`.
+        ema_decay: if positive, the result is an exponential moving average of the weights with this decay per step.
+        log_interval: steps between entries of log and history.
+        seed: of the order of the rows.
+        matmul_precision: of float32 matrix products while training: "highest", "high" or "medium", as
+            `torch.set_float32_matmul_precision` has it. Faster where the processor has something faster to offer.
+        autocast: whether the network computes in bfloat16, which is faster still; the weights stay float32.
+
+    Raises:
+        InvalidInputError: if a figure is outside its range.
+    """
+
+    steps: int = 7000
+    batch_size: int = 1024
+    learning_rate: float = 2e-3
+    warmup: float = 0.1
+    weight_decay: float = 1e-4
+    max_grad_norm: float = 1.0
+    space: str = "radians"
+    ema_decay: float = 0.0
+    log_interval: int = 250
+    seed: int = 0
+    matmul_precision: str = "highest"
+    autocast: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("steps", "batch_size", "log_interval", "learning_rate", "max_grad_norm"):
+            if not getattr(self, name) > 0:
+                raise InvalidInputError(f"{name} must be positive, got {getattr(self, name)!r}")
+        for name in ("warmup", "ema_decay"):
+            if not 0 <= getattr(self, name) < 1:
+                raise InvalidInputError(f"{name} must lie in [0, 1), got {getattr(self, name)!r}")
+        if self.weight_decay < 0:
+            raise InvalidInputError(f"weight_decay must be >= 0, got {self.weight_decay!r}")
+        for name, known in (("space", losses.SPACES), ("matmul_precision", PRECISIONS)):
+            if getattr(self, name) not in known:
+                raise InvalidInputError(f"{name} must be one of {', '.join(known)}; got {getattr(self, name)!r}")
+
+
+@dataclasses.dataclass
+class BCHistory:
+    """What was logged during training, one entry per `BCConfig.log_interval` steps and one at the end.
+
+    Attributes:
+        steps: gradient steps done.
+        loss: of the last batch.
+        mse: task -> mean squared error of the last batch [rad^2].
+        r2: task -> held-out R2 over all joints; empty without validation data.
+    """
+
+    steps: list[int] = dataclasses.field(default_factory=list)
+    loss: list[float] = dataclasses.field(default_factory=list)
+    mse: dict[str, list[float]] = dataclasses.field(default_factory=dict)
+    r2: dict[str, list[float]] = dataclasses.field(default_factory=dict)
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON-ready values."""
+        return dataclasses.asdict(self)
+
+
+class BCTrainer(imitation_bc.BC):
+    """`imitation`'s BC loop with the multi-task loss, AdamW under a one-cycle schedule, and gradient clipping.
+
+    Only the actor is trained. The log's step axis counts gradient steps over all calls of `fit`, so that the rounds of
+    DAgger follow each other.
+
+    Args:
+        policy: the student, its normalisation already fitted.
+        config: how to clone.
+        logger: shared log, or None for a silent one.
+    """
+
+    def __init__(
+        self, policy: MultiHeadPolicy, config: BCConfig | None = None, logger: HierarchicalLogger | None = None
+    ) -> None:
+        self.config = config or BCConfig()
+        super().__init__(
+            observation_space=policy.observation_space,
+            action_space=policy.action_space,
+            rng=np.random.default_rng(self.config.seed),
+            policy=policy,
+            batch_size=self.config.batch_size,
+            device=policy.device,
+            custom_logger=make_logger() if logger is None else logger,
+        )
+        self.steps_done = 0
+        self._bc_logger = _StepLogger(self.logger)
+
+    def fit(
+        self,
+        dataset: Demonstrations,
+        validation: Demonstrations | None = None,
+        progress: bool = False,
+        on_batch_end: Callable[[], None] | None = None,
+        seed: int | None = None,
+        weights: np.ndarray | None = None,
+    ) -> BCHistory:
+        """Run the whole schedule once on a data set, starting from the present weights.
+
+        Args:
+            dataset: training rows.
+            validation: held-out rows whose R2 is logged, or None.
+            progress: show a bar.
+            on_batch_end: called after every gradient step.
+            seed: of the order of the rows; None takes the configuration's.
+            weights: how often each row is drawn per pass, positive integers, shape (n,); None draws each once.
+
+        Raises:
+            InvalidInputError: if the weights are not as described.
+            TrainingDivergedError: if the loss is no longer finite.
+        """
+        config, policy = self.config, self.policy
+        batch_size = min(config.batch_size, len(dataset))
+        self.batch_size = self.minibatch_size = batch_size
+        seed = config.seed if seed is None else seed
+        batches = TensorBatches(dataset, batch_size, seed, policy.device, weights)
+        self.set_demonstrations(batches)
+        self.loss_calculator = losses.MultiTaskLoss(
+            dataset.tasks, dataset.half_range, config.space, batches.rows, config.autocast
+        )
+        self.optimizer, schedule = _optimizer(policy, config)
+        average = _Average(policy.actor, config.ema_decay) if config.ema_decay else None
+        self.history = BCHistory()
+        first = self.steps_done
+        was_training = policy.training
+        with tqdm(total=config.steps, desc="clone", unit="step", disable=not progress) as bar:
+
+            def after_step() -> None:
+                schedule.step()
+                self.steps_done += 1
+                if average is not None:
+                    average.update()
+                bar.update()
+                if (self.steps_done - first) % config.log_interval == 0 or self.steps_done - first == config.steps:
+                    bar.set_postfix(loss=f"{self._record(validation):.2e}")
+                if on_batch_end is not None:
+                    on_batch_end()
+
+            policy.set_training_mode(True)
+            try:
+                with matmul_precision(config.matmul_precision):
+                    self.train(n_batches=config.steps, on_batch_end=after_step, log_interval=1, progress_bar=False)
+            finally:
+                policy.set_training_mode(was_training)
+        if average is not None:
+            average.copy_to_network()
+        return self.history
+
+    def _record(self, validation: Demonstrations | None) -> float:
+        """Write the last batch's losses and the held-out R2 to history and log; return the loss."""
+        last = {name: float(value.detach()) for name, value in vars(self._bc_logger.metrics).items()}
+        history = self.history
+        if not np.isfinite(last["loss"]):
+            raise TrainingDivergedError(f"the loss is {last['loss']} after {self.steps_done} steps")
+        history.steps.append(self.steps_done)
+        history.loss.append(last["loss"])
+        for task in self.loss_calculator.tasks:
+            if f"mse_{task}" in last:
+                history.mse.setdefault(task, []).append(last[f"mse_{task}"])
+        for name, value in last.items():
+            self.logger.record(f"bc/{name}", value)
+        if validation is not None:
+            for task, scores in offline_metrics(self.policy, validation).items():
+                history.r2.setdefault(task, []).append(scores["r2"])
+                self.logger.record(f"held_out/r2_{task}", scores["r2"])
+            self.policy.set_training_mode(True)
+        self.logger.dump(self.steps_done)
+        return last["loss"]
+
+
+class _StepLogger(imitation_bc.BCLogger):
+    """Keeps each batch's metrics instead of writing them: `BCTrainer` writes, with gradient steps as the axis."""
+
+    metrics: losses.MultiTaskMetrics
+
+    def log_batch(
+        self, batch_num: int, batch_size: int, num_samples_so_far: int, training_metrics: Any, rollout_stats: Any
+    ) -> None:
+        self.metrics = training_metrics
+
+
+class _Average:
+    """Exponential moving average of a network's weights, with a shorter memory in the first steps."""
+
+    def __init__(self, network: torch.nn.Module, decay: float) -> None:
+        self._weights = list(network.parameters())
+        self._average = [weight.detach().clone() for weight in self._weights]
+        self._decay = decay
+        self._updates = 0
+
+    @torch.no_grad()
+    def update(self) -> None:
+        """Take in the present weights."""
+        self._updates += 1
+        decay = min(self._decay, (1 + self._updates) / (10 + self._updates))
+        for average, weight in zip(self._average, self._weights):
+            average.lerp_(weight, 1 - decay)
+
+    @torch.no_grad()
+    def copy_to_network(self) -> None:
+        """Replace the network's weights by their average."""
+        for average, weight in zip(self._average, self._weights):
+            weight.copy_(average)
+
+
+def _optimizer(
+    policy: MultiHeadPolicy, config: BCConfig
+) -> tuple[torch.optim.Optimizer, torch.optim.lr_scheduler.LRScheduler]:
+    """AdamW over the actor alone, which clips its gradients before each step, and its one-cycle schedule."""
+    weights = list(policy.actor.parameters())
+    optimizer, schedule = adamw_one_cycle(
+        weights, config.learning_rate, config.weight_decay, config.steps, config.warmup
+    )
+
+    def clip(*_: Any) -> None:
+        torch.nn.utils.clip_grad_norm_(weights, config.max_grad_norm)
+
+    optimizer.register_step_pre_hook(clip)
+    return optimizer, schedule
+
+
+def train_bc(
+    policy: MultiHeadPolicy,
+    dataset: Demonstrations,
+    config: BCConfig | None = None,
+    validation: Demonstrations | None = None,
+    logger: HierarchicalLogger | None = None,
+    progress: bool = False,
+    on_batch_end: Callable[[], None] | None = None,
+    fit_normalization: bool = True,
+) -> BCHistory:
+    """Clone: fit the policy's normalisation to the data set, then its actor.
+
+    Args:
+        policy: the student; trained in place.
+        dataset: training rows.
+        config: how to clone.
+        validation: held-out rows whose R2 is logged, or None.
+        logger: from `trainers.make_logger`; None logs nothing.
+        progress: show a bar.
+        on_batch_end: called after every gradient step.
+        fit_normalization: False keeps the normalisation that the policy has (its weights belong to it).
+
+    Returns:
+        Losses and held-out R2 over the steps.
+    """
+    if fit_normalization:
+        policy.fit_normalization(dataset.obs, dataset.acts)
+    return BCTrainer(policy, config, logger).fit(dataset, validation, progress, on_batch_end)

@@ -1,0 +1,282 @@
+"""DAgger on `imitation`'s trainer: our collector, shards, batches and loss in its rounds."""
+
+import dataclasses
+import json
+from collections.abc import Callable
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from imitation.algorithms import dagger as imitation_dagger
+from imitation.util.logger import HierarchicalLogger
+from stable_baselines3.common.vec_env import VecEnv
+from tqdm.auto import tqdm
+
+from go1_mtl_gym.errors import InvalidInputError
+from trainers.algorithms.bc import BCConfig, BCHistory, BCTrainer
+from trainers.algorithms.dagger_collector import BlockCollector
+from trainers.data.collection import ShardMismatchError
+from trainers.data.demonstrations import Demonstrations
+from trainers.data.environments import derive_seed
+from trainers.policies.expert_policy import ExpertPolicy
+from trainers.policies.multi_head import MultiHeadPolicy
+from trainers.policies.stateful import Learner
+from trainers.utils.files import write_atomically
+from trainers.utils.logging import make_logger
+
+
+@dataclasses.dataclass(frozen=True)
+class DAggerConfig:
+    """How to collect a round.
+
+    Attributes:
+        seconds_per_task: rows recorded per task and round [s].
+        beta: probability that a block of the first round is the expert's.
+        beta_decay: factor on beta per round.
+        block_s: shortest and longest block [s].
+        takeover_rad: the expert takes over when the root mean square over the joints of the learner's joint targets
+            less its own exceeds this [rad]; None never. See `trainers.BlockCollector`.
+        round_weight: how many times as often a row of a round is drawn in training as a row of the base.
+        seed: of everything random in collection.
+
+    Raises:
+        InvalidInputError: if a figure is outside its range.
+    """
+
+    seconds_per_task: float = 60.0
+    beta: float = 0.5
+    beta_decay: float = 1.0
+    block_s: tuple[float, float] = (0.3, 1.0)
+    takeover_rad: float | None = None
+    round_weight: int = 1
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "block_s", tuple(self.block_s))
+        if not self.seconds_per_task > 0 or self.seed < 0:
+            raise InvalidInputError(f"seconds_per_task must be > 0 and seed >= 0, got {self}")
+        if not (0 <= self.beta <= 1 and 0 <= self.beta_decay <= 1):
+            raise InvalidInputError(f"beta and beta_decay must lie in [0, 1], got {self}")
+        if len(self.block_s) != 2 or not 0 < self.block_s[0] <= self.block_s[1]:
+            raise InvalidInputError(f"block_s must be 0 < shortest <= longest, got {self.block_s}")
+        if self.takeover_rad is not None and not self.takeover_rad > 0:
+            raise InvalidInputError(f"takeover_rad must be None or positive, got {self.takeover_rad}")
+        if isinstance(self.round_weight, bool) or not isinstance(self.round_weight, int) or self.round_weight < 1:
+            raise InvalidInputError(f"round_weight must be an integer of at least 1, got {self.round_weight!r}")
+
+    def beta_of(self, round_num: int) -> float:
+        """Probability of an expert block in a round, counted from 0."""
+        return self.beta * self.beta_decay**round_num
+
+
+class DAggerTrainer(imitation_dagger.DAggerTrainer):
+    """Rounds of collecting with learner and expert taking turns, and cloning on all rows so far (Ross et al., 2011).
+
+    The environments own the gait clock, so expert and learner share it. Under `scratch_dir` stand ``config.json``,
+    ``demos/round-000/demonstrations.npz`` and ``policy-000.zip`` per round, each complete or absent: a trainer made
+    anew on the same folder with the same settings takes finished parts from there.
+
+    Args:
+        venv: environments of all tasks, e.g. from `trainers.make_venv`, with a method ``expert_action``.
+        policy: the student, already cloned on `base`; its normalisation stays as it is.
+        base: demonstrations that every round trains on too.
+        config: how to collect.
+        bc_config: how to clone in each round.
+        scratch_dir: folder for resuming.
+        logger: from `trainers.make_logger`; shared by collection and cloning. None logs nothing.
+        validation: held-out rows whose R2 is logged, or None.
+        progress: show bars.
+
+    Raises:
+        ShardMismatchError: if `scratch_dir` was filled with other settings.
+    """
+
+    def __init__(
+        self,
+        venv: VecEnv,
+        policy: MultiHeadPolicy,
+        base: Demonstrations,
+        config: DAggerConfig | None = None,
+        bc_config: BCConfig | None = None,
+        *,
+        scratch_dir: str | PathLike[str],
+        logger: HierarchicalLogger | None = None,
+        validation: Demonstrations | None = None,
+        progress: bool = False,
+    ) -> None:
+        self.config = config or DAggerConfig()
+        self.base = base
+        self.validation = validation
+        self.progress = progress
+        logger = make_logger() if logger is None else logger
+        super().__init__(
+            venv=venv,
+            scratch_dir=scratch_dir,
+            rng=np.random.default_rng(self.config.seed),
+            beta_schedule=self.config.beta_of,
+            bc_trainer=BCTrainer(policy, bc_config, logger),
+            custom_logger=logger,
+        )
+        self.expert_policy = ExpertPolicy(venv)
+        self._rounds: list[Demonstrations] = []
+        self._claim_folder()
+
+    # -- Rounds --------------------------------------------------------------------------------------------------------
+
+    def run(self, rounds: int, callback: Callable[["DAggerTrainer", int], None] | None = None) -> MultiHeadPolicy:
+        """Collect and train until `rounds` rounds are done.
+
+        Args:
+            rounds: total number, those found in `scratch_dir` included.
+            callback: called as ``callback(trainer, rounds_done)`` after each round; evaluate and log there.
+
+        Returns:
+            The policy.
+        """
+        while self.round_num < rounds:
+            self.collect_round()
+            self.train_round()
+            if callback is not None:
+                callback(self, self.round_num)
+        return self.policy
+
+    @property
+    def rows(self) -> Demonstrations:
+        """All rows so far: the base and every round collected."""
+        return Demonstrations.concatenate([self.base, *self._rounds])
+
+    def collect_round(self, seconds_per_task: float | None = None) -> Demonstrations:
+        """Record the present round, or read it if it was recorded before.
+
+        Args:
+            seconds_per_task: rows of each task [s]; None takes the configuration's.
+        """
+        if len(self._rounds) > self.round_num:
+            return self._rounds[-1]
+        seconds = self.config.seconds_per_task if seconds_per_task is None else seconds_per_task
+        path = self._demo_dir_path_for_round() / "demonstrations.npz"
+        meta = {"dagger_round": self.round_num, "seconds_per_task": seconds, "beta": self.beta_schedule(self.round_num)}
+        rows = _read_round(path, meta)
+        if rows is None:
+            collector = self.create_trajectory_collector(seconds)
+            self._drive(collector)
+            counts = {name: getattr(collector, name) for name in ("learner_share", "falls", "takeovers")}
+            for name, value in counts.items():
+                self.logger.record(f"dagger/{name}", value)
+            rows = dataclasses.replace(self.base, **collector.recorded(), meta=meta | counts)
+            rows.save(path)
+        self._rounds.append(rows)
+        return rows
+
+    def train_round(self, on_batch_end: Callable[[], None] | None = None) -> BCHistory | None:
+        """Clone on all rows so far and go on to the next round.
+
+        Returns:
+            Losses over the steps; None if the round's policy was found in `scratch_dir` instead.
+
+        Raises:
+            imitation.algorithms.dagger.NeedsDemosException: if the round was not collected.
+        """
+        if len(self._rounds) <= self.round_num:
+            raise imitation_dagger.NeedsDemosException(f"call collect_round() before train_round() {self.round_num}")
+        path = self.scratch_dir / f"policy-{self.round_num:03d}.zip"
+        history = None
+        if path.is_file():
+            self.policy.load_state_dict(MultiHeadPolicy.load(path, self.policy.device).state_dict())
+            self.bc_trainer.steps_done += self.bc_trainer.config.steps
+        else:
+            data = self.rows
+            weights = np.full(len(data), self.config.round_weight)
+            weights[: len(self.base)] = 1
+            self.logger.record("dagger/round", self.round_num)
+            self.logger.record("dagger/rows", len(data))
+            seed = derive_seed("round", self.bc_trainer.config.seed, self.round_num)
+            history = self.bc_trainer.fit(data, self.validation, self.progress, on_batch_end, seed, weights)
+            self.policy.save(path)
+        self.round_num += 1
+        return history
+
+    # -- What imitation's trainer is asked for -------------------------------------------------------------------------
+
+    def create_trajectory_collector(self, seconds_per_task: float | None = None) -> BlockCollector:
+        """The collector of the present round; it is a vector environment whose `step` takes the expert's actions."""
+        seconds = self.config.seconds_per_task if seconds_per_task is None else seconds_per_task
+        round_seed = derive_seed("dagger", self.config.seed, self.round_num)
+        self.venv.seed(round_seed)
+        return BlockCollector(
+            self.venv,
+            Learner(self.policy),
+            self.beta_schedule(self.round_num),
+            self._demo_dir_path_for_round(),
+            np.random.default_rng(round_seed),
+            rows_per_env=self._rows_per_env(seconds),
+            control_hz=self.base.control_hz,
+            block_s=self.config.block_s,
+            half_range=self.base.half_range,
+            takeover_rad=self.config.takeover_rad,
+        )
+
+    def extend_and_update(self, bc_train_kwargs: Any = None) -> int:
+        """`imitation`'s name for `train_round`; returns the next round's number.
+
+        Raises:
+            InvalidInputError: if keyword arguments are given: `BCConfig` holds them here.
+        """
+        if bc_train_kwargs:
+            raise InvalidInputError(f"cloning is described by bc_config, got bc_train_kwargs={bc_train_kwargs!r}")
+        self.train_round()
+        return self.round_num
+
+    def save_trainer(self) -> tuple[Path, Path]:
+        """Save the policy; everything else is on disk already. Returns (scratch_dir, path of the policy)."""
+        path = self.scratch_dir / "policy-latest.zip"
+        self.policy.save(path)
+        return self.scratch_dir, path
+
+    # -- Details -------------------------------------------------------------------------------------------------------
+
+    def _drive(self, collector: BlockCollector) -> None:
+        obs = collector.reset()
+        with tqdm(
+            total=collector.wanted, desc=f"DAgger {self.round_num}", unit="row", disable=not self.progress
+        ) as bar:
+            while not collector.finished:
+                obs, *_ = collector.step(self.expert_policy.predict(obs)[0])
+                bar.update(collector.rows - bar.n)
+
+    def _rows_per_env(self, seconds_per_task: float) -> np.ndarray:
+        """Share each task's rows among its environments, by the task ids of their first observations."""
+        task = self.venv.reset()[:, -len(self.base.tasks) :].argmax(axis=1)
+        count = np.bincount(task, minlength=len(self.base.tasks))
+        return np.ceil(seconds_per_task * self.base.control_hz / count[task]).astype(int)
+
+    def _claim_folder(self) -> None:
+        settings = {
+            "config": dataclasses.asdict(self.config),
+            "bc_config": dataclasses.asdict(self.bc_trainer.config),
+            "network": self.policy.network_kwargs(),
+            "base_rows": len(self.base),
+        }
+        text = json.dumps(settings, indent=1, default=str)
+        path = self.scratch_dir / "config.json"
+        if not path.is_file():
+            write_atomically(path, lambda file: file.write(text.encode()))
+            return
+        found = json.loads(path.read_text())
+        for name, kind in (("config", DAggerConfig), ("bc_config", BCConfig)):  # with options that came later
+            found[name] = dataclasses.asdict(kind()) | found.get(name, {})
+        if found != json.loads(text):
+            raise ShardMismatchError(f"{self.scratch_dir} holds rounds made with other settings; use another folder")
+
+
+def _read_round(path: Path, meta: dict[str, Any]) -> Demonstrations | None:
+    """The rows of a finished round; None if they must be (re)made."""
+    try:
+        rows = Demonstrations.load(path)
+    except InvalidInputError:  # absent or damaged
+        return None
+    made_from = {key: rows.meta.get(key) for key in meta}
+    if made_from != meta:
+        raise ShardMismatchError(f"{path} was made from {made_from}, now asked for {meta}; use another folder")
+    return rows

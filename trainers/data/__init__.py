@@ -1,0 +1,1 @@
+"""Environments to step, demonstrations collected in them, and batches of their rows."""

@@ -1,0 +1,243 @@
+"""Asking the expert: demonstrations as a pure function of their description, made in parallel and resumable."""
+
+import dataclasses
+import json
+from collections.abc import Callable, Iterable, Sequence
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import joblib
+import numpy as np
+from threadpoolctl import threadpool_limits
+from tqdm.auto import tqdm
+
+from go1_mtl_gym.errors import Go1Error, InvalidInputError
+from go1_mtl_gym.sensing.observation import ObservationLayout
+from trainers.data.demonstrations import Demonstrations
+from trainers.data.environments import EnvFactory, PerturbationConfig, WithTasks, derive_seed, make_env
+
+BEFORE_FALL_S = 0.24
+"""The last seconds before a fall are not worth imitating and are dropped [s]."""
+EPISODE_S = 30.0
+"""Longest episode [s]."""
+
+
+class ShardMismatchError(InvalidInputError):
+    """A shard on disk was made from another description than the one asked for."""
+
+
+class CollectionError(Go1Error):
+    """The driver falls so often that the seconds asked for cannot be had."""
+
+
+@dataclasses.dataclass(frozen=True)
+class CollectJob:
+    """Description of one shard; equal descriptions give equal rows.
+
+    Attributes:
+        task: name of the task that every episode begins in.
+        seed: of everything random.
+        seconds: duration of the kept rows [s].
+        command: (vx [m/s], vy [m/s], yaw rate [rad/s]) of every episode, or None to draw one per episode.
+        perturbation: disturbances, or None for the clean expert. With a `command` given, commands are not redrawn. With
+            a `task_interval`, rows of all the environment's tasks follow one another.
+        env_kwargs: of the environment.
+
+    Raises:
+        InvalidInputError: if the seed is negative or the seconds are not positive.
+    """
+
+    task: str
+    seed: int
+    seconds: float = 30.0
+    command: tuple[float, float, float] | None = None
+    perturbation: PerturbationConfig | None = None
+    env_kwargs: dict[str, Any] = dataclasses.field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.seed < 0 or not self.seconds > 0:
+            raise InvalidInputError(f"seed must be >= 0 and seconds > 0, got {self.seed} and {self.seconds}")
+        if self.command is not None:
+            object.__setattr__(self, "command", tuple(float(value) for value in self.command))
+
+    @property
+    def name(self) -> str:
+        """File name of the shard, without suffix."""
+        return f"{self.task}-{'perturbed' if self.perturbation else 'clean'}-{self.seed:06d}"
+
+    def as_dict(self) -> dict[str, Any]:
+        """The description as JSON values."""
+        return json.loads(json.dumps(dataclasses.asdict(self)))
+
+
+def collect(
+    task: str,
+    command: Sequence[float] | None = None,
+    seed: int = 0,
+    seconds: float = 30.0,
+    perturbation: PerturbationConfig | None = None,
+    env_kwargs: dict[str, Any] | None = None,
+    *,
+    make_env: EnvFactory = make_env,
+) -> Demonstrations:
+    """Let the expert drive and record what it would do, at every state before the step.
+
+    Episodes start standing and last up to 30 s. After a fall the last 0.24 s are dropped and a new episode starts. The
+    result depends on the arguments alone.
+
+    Args:
+        task, command, seed, seconds, perturbation, env_kwargs: as in `CollectJob`.
+        make_env: another environment factory.
+
+    Raises:
+        CollectionError: if falls leave less than a fifth of the steps.
+    """
+    job = CollectJob(task, seed, seconds, command, perturbation, dict(env_kwargs or {}))
+    if job.command is not None and perturbation is not None:
+        perturbation = dataclasses.replace(perturbation, command_interval=None)
+    env = make_env(task, perturbation, **{"episode_s": EPISODE_S, **job.env_kwargs})
+    try:
+        return _record(env, job, lambda obs: env.unwrapped.expert_action())
+    finally:
+        env.close()
+
+
+def watch(
+    policy: Any,
+    task: str,
+    seed: int = 0,
+    seconds: float = 30.0,
+    perturbation: PerturbationConfig | None = None,
+    history: int = 1,
+    *,
+    make_env: EnvFactory = make_env,
+    **env_kwargs: Any,
+) -> tuple[Demonstrations, ObservationLayout]:
+    """Let a policy without a state drive, and record what it did; no expert is asked.
+
+    Args:
+        policy: with ``predict(obs, deterministic=True)`` and `env_kwargs`, of one frame of proprioception.
+        task, seed, seconds, perturbation: as in `CollectJob`.
+        history: frames of proprioception that are recorded; the policy sees the newest.
+        make_env: another environment factory.
+        env_kwargs: of the environment; on top of the policy's own ``env_kwargs``.
+
+    Returns:
+        The rows, and the layout of their observations.
+
+    Raises:
+        InvalidInputError: if the policy sees several frames, the seed is negative or the seconds are not positive.
+        CollectionError: if falls leave less than a fifth of the steps.
+    """
+    frames = policy.env_kwargs.get("history", 1)
+    if frames != 1:
+        raise InvalidInputError(f"a policy of one frame of proprioception was expected, got one of {frames}")
+    job = CollectJob(task, seed, seconds, None, perturbation, {**policy.env_kwargs, "history": history, **env_kwargs})
+    env = make_env(task, perturbation, **{"episode_s": EPISODE_S, **job.env_kwargs})
+    layout = env.unwrapped.layout
+    columns = layout.columns(ObservationLayout(layout.tasks, layout.channels))
+    try:
+        return _record(env, job, lambda obs: policy.predict(obs[columns], deterministic=True)[0]), layout
+    finally:
+        env.close()
+
+
+def _record(env: Any, job: CollectJob, act: Callable[[np.ndarray], np.ndarray]) -> Demonstrations:
+    """The rows of a job: what was seen, and what `act` made of it; it also drives."""
+    base = env.unwrapped
+    wanted = round(job.seconds * base.control_hz)
+    obs_rows: list[np.ndarray] = []
+    act_rows: list[np.ndarray] = []
+    starts: list[int] = []
+    steps = 0
+    for episode in range(5 * wanted + 1):
+        if len(obs_rows) >= wanted:
+            break
+        starts.append(len(obs_rows))
+        options = {} if job.command is None else {"command": job.command}
+        obs, _ = env.reset(seed=derive_seed("collect", job.task, job.seed, episode), options=options)
+        ended = False
+        while not ended and len(obs_rows) < wanted:
+            label = act(obs)
+            obs_rows.append(obs)
+            act_rows.append(label)
+            obs, _, terminated, truncated, _ = env.step(label)
+            steps += 1
+            ended = terminated or truncated
+            if terminated:
+                keep = max(starts[-1], len(obs_rows) - round(BEFORE_FALL_S * base.control_hz))
+                del obs_rows[keep:], act_rows[keep:]
+        if steps > 5 * wanted + base.control_hz * EPISODE_S:
+            raise CollectionError(f"the driver keeps falling: kept {len(obs_rows)} of {steps} steps of {job.as_dict()}")
+    marks = np.zeros(len(obs_rows), dtype=bool)
+    marks[[start for start in starts if start < len(obs_rows)]] = True
+    return Demonstrations(
+        obs=np.array(obs_rows),
+        acts=np.array(act_rows),
+        starts=marks,
+        tasks=base.tasks,
+        center=base.action_map.center,
+        half_range=base.action_map.half_range,
+        control_hz=base.control_hz,
+        meta={"job": job.as_dict()},
+    )
+
+
+def collect_all(
+    jobs: Iterable[CollectJob],
+    out_dir: str | PathLike[str],
+    n_jobs: int = 1,
+    progress: bool = False,
+    *,
+    make_env: EnvFactory = make_env,
+) -> list[Path]:
+    """Make one shard per job under `out_dir`; what is already there is kept, so an interrupted call can be repeated.
+
+    Args:
+        jobs: descriptions with different names.
+        out_dir: folder of the ``.npz`` shards.
+        n_jobs: processes, by joblib (``joblib.parallel_config`` chooses its backend, a cluster's too); 1 stays in this.
+        progress: show a bar.
+        make_env: another environment factory; picklable if n_jobs > 1.
+
+    Returns:
+        Paths of the shards, in the order of the jobs; read them with `Demonstrations.load`.
+
+    Raises:
+        ShardMismatchError: if a shard of that name was made from another description.
+        InvalidInputError: if two jobs have one name.
+    """
+    jobs = list(jobs)
+    paths = [Path(out_dir) / f"{job.name}.npz" for job in jobs]
+    if len(set(paths)) < len(paths):
+        raise InvalidInputError(f"jobs must differ in task, kind or seed, got {sorted(job.name for job in jobs)}")
+    todo = [(job, path) for job, path in zip(jobs, paths) if not _is_done(job, path)]
+    done = len(jobs) - len(todo)
+    with tqdm(total=len(jobs), initial=done, desc="collect", unit="shard", disable=not progress) as bar:
+        if n_jobs == 1:
+            for job, path in todo:
+                _make_shard(job, path, make_env)
+                bar.update()
+        elif todo:
+            tasks = (joblib.delayed(WithTasks(_make_shard))(job, path, make_env) for job, path in todo)
+            for _ in joblib.Parallel(n_jobs=n_jobs, return_as="generator_unordered")(tasks):
+                bar.update()
+    return paths
+
+
+def _is_done(job: CollectJob, path: Path) -> bool:
+    try:
+        made_from = Demonstrations.load(path).meta.get("job")
+    except InvalidInputError:  # absent or damaged: make it again
+        return False
+    if made_from != job.as_dict():
+        raise ShardMismatchError(
+            f"{path} was made from {made_from}, now asked for {job.as_dict()}; use another folder or delete it"
+        )
+    return True
+
+
+def _make_shard(job: CollectJob, path: Path, make_env: EnvFactory) -> None:
+    with threadpool_limits(1):
+        collect(**{f.name: getattr(job, f.name) for f in dataclasses.fields(job)}, make_env=make_env).save(path)

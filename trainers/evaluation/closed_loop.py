@@ -1,0 +1,105 @@
+"""Closed loop: does it stay up, go where it is told, and step?"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from go1_mtl_gym import TASKS
+from go1_mtl_gym.errors import InvalidInputError
+from trainers.data.environments import EnvFactory, derive_seed, make_env
+from trainers.evaluation.rollout import Rollout, controller, opened, run_all
+from trainers.evaluation.scoring import ClosedLoopResult, EpisodeRecord, score
+
+
+def evaluate(
+    policy_or_expert: Any,
+    task: str = "trot",
+    episodes: int = 20,
+    seconds: float = 30.0,
+    seed: int = 1,
+    *,
+    commands: Sequence[Sequence[float]] | None = None,
+    command_interval: float | None = None,
+    corners: bool = False,
+    n_jobs: int = 1,
+    progress: bool = False,
+    make_env: EnvFactory = make_env,
+    **env_kwargs: Any,
+) -> ClosedLoopResult:
+    """Run episodes from a standing start and score them; the same function for students and experts.
+
+    Episode i depends on (seed, task, i) alone: its command is drawn from the task's range with seeds that collection
+    never uses, and is the same for every policy.
+
+    Args:
+        policy_or_expert: something with ``predict(obs, deterministic=True)`` (a policy; if its `predict` takes `state`
+            and `episode_start` too, it is given back the state that it returned), something with ``reset(state)`` and
+            ``action(state) -> 12 joint targets [rad]`` (an expert), or "expert" for the environment's own.
+        task: name of the task.
+        episodes: how many.
+        seconds: duration of each [s].
+        seed: of all of them.
+        commands: (vx [m/s], vy [m/s], yaw rate [rad/s]) for the episodes, used in turn; None draws them.
+        command_interval: draw a new command every so many seconds; None keeps one per episode.
+        corners: draw commands from the corners of the task's range, where every component is at its largest, instead
+            of from its inside.
+        n_jobs: processes.
+        progress: show a bar.
+        make_env: another environment factory.
+        env_kwargs: of the environment; on top of the policy's own ``env_kwargs``.
+
+    Raises:
+        InvalidInputError: if an argument is not as described.
+    """
+    if task not in TASKS:
+        raise InvalidInputError(f"task must be one of {', '.join(TASKS)}; got {task!r}")
+    if episodes < 1 or not seconds > 0:
+        raise InvalidInputError(f"episodes must be >= 1 and seconds > 0, got {episodes} and {seconds}")
+    if commands is not None and len(commands) == 0:
+        raise InvalidInputError("commands must be None or hold at least one (vx, vy, yaw rate), got none")
+    if commands is not None and corners:
+        raise InvalidInputError(f"commands are given or drawn from corners, got corners=True and {commands}")
+    if command_interval is not None and not command_interval > 0:
+        raise InvalidInputError(f"command_interval must be None or positive, got {command_interval}")
+    controller(policy_or_expert, None)
+    kwargs = {**getattr(policy_or_expert, "env_kwargs", {}), **env_kwargs, "episode_s": seconds}
+
+    def call(i: int) -> tuple[Any, ...]:
+        command = None if commands is None else tuple(commands[i % len(commands)])
+        own_seed = derive_seed("evaluate", task, seed, i)
+        return policy_or_expert, task, own_seed, command, command_interval, corners, kwargs, make_env
+
+    records = run_all(_episode, map(call, range(episodes)), episodes, n_jobs, progress, f"evaluate {task}")
+    return ClosedLoopResult(task, float(seconds), tuple(records))
+
+
+def _episode(
+    policy_or_expert: Any,
+    task: str,
+    seed: int,
+    command: tuple[float, ...] | None,
+    command_interval: float | None,
+    corners: bool,
+    env_kwargs: dict[str, Any],
+    make_env: EnvFactory,
+) -> EpisodeRecord:
+    rng = np.random.default_rng(derive_seed("commands", seed))
+    draw = TASKS[task].draw_corner if corners else TASKS[task].draw_command
+    options: dict[str, Any] = {"task": task}
+    if command is not None or corners:
+        options["command"] = tuple(draw(rng).tolist()) if command is None else command
+    with opened(make_env, task, env_kwargs) as env:
+        base = env.unwrapped
+        rollout = Rollout(env, policy_or_expert, seed, options)
+        given = [rollout.command]
+        steps = round(env_kwargs["episode_s"] * base.control_hz)
+        every = max(1, round(command_interval * base.control_hz)) if command_interval else steps
+
+        def redraw(i: int) -> None:
+            if i and i % every == 0:
+                given.append(tuple(draw(rng).tolist()))
+                base.set_command(given[-1])
+
+        series = rollout.walk(steps, redraw)
+        return score(series, rollout.fallen, seed, tuple(given), TASKS[task].gait, base.control_hz)

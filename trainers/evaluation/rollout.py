@@ -1,0 +1,143 @@
+"""Who turns observations into actions, and an episode under their control."""
+
+import contextlib
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+import joblib
+import numpy as np
+from threadpoolctl import threadpool_limits
+from tqdm.auto import tqdm
+
+from go1_mtl_gym.errors import InvalidInputError
+from trainers.data.environments import EnvFactory, WithTasks
+from trainers.evaluation.scoring import Series
+from trainers.policies.stateful import Learner
+
+
+def controller(policy_or_expert: Any, env: Any) -> Callable[[np.ndarray], np.ndarray]:
+    """What turns the observations of one episode of `env`, in their order, into actions; make one per episode.
+
+    Raises:
+        InvalidInputError: if it is neither a policy nor an expert.
+    """
+    if isinstance(policy_or_expert, str) and policy_or_expert == "expert":
+        return lambda obs: env.expert_action()
+    if hasattr(policy_or_expert, "predict"):
+        return _follow(Learner(policy_or_expert))
+    if hasattr(policy_or_expert, "action"):
+        return lambda obs: env.action_map.from_radians(policy_or_expert.action(_expert_state(env))).astype(np.float32)
+    raise InvalidInputError(
+        f'expected something with predict(obs), something with action(state), or "expert"; got {policy_or_expert!r}'
+    )
+
+
+def _follow(learner: Learner) -> Callable[[np.ndarray], np.ndarray]:
+    start = np.array([True])
+
+    def act(obs: np.ndarray) -> np.ndarray:
+        nonlocal start
+        action, start = learner.act(obs, start), np.array([False])
+        return action
+
+    return act
+
+
+def begin(env: Any, policy_or_expert: Any, seed: int, options: dict[str, Any]) -> tuple[np.ndarray, dict[str, Any]]:
+    """Reset an environment, and an expert that is no policy with it; returns observation and info."""
+    obs, info = env.reset(seed=seed, options=options)
+    if hasattr(policy_or_expert, "reset") and not hasattr(policy_or_expert, "predict"):
+        policy_or_expert.reset(_expert_state(env.unwrapped))
+    return obs, info
+
+
+def _expert_state(env: Any) -> Any:
+    """What the environment shows an expert."""
+    return env.estimated_state if hasattr(env, "estimated_state") else env.state
+
+
+@contextlib.contextmanager
+def opened(make_env: EnvFactory, task: str, env_kwargs: dict[str, Any]) -> Iterator[Any]:
+    """An environment that is closed afterwards; linear algebra uses one thread meanwhile."""
+    env = make_env(task, None, **env_kwargs)
+    try:
+        with threadpool_limits(1):
+            yield env
+    finally:
+        env.close()
+
+
+class Rollout:
+    """One episode from its standing start, stepped and measured.
+
+    Args:
+        env: an environment with a method ``expert_action``.
+        policy_or_expert: as in `trainers.evaluate`.
+        seed: of the reset.
+        options: of the reset.
+
+    Attributes:
+        command: (vx [m/s], vy [m/s], yaw rate [rad/s]) that the episode began with.
+        fallen: whether it ended in a fall.
+    """
+
+    def __init__(self, env: Any, policy_or_expert: Any, seed: int, options: dict[str, Any]) -> None:
+        self._env = env
+        self._act = controller(policy_or_expert, env.unwrapped)
+        self._obs, self._info = begin(env, policy_or_expert, seed, options)
+        self.command = tuple(float(value) for value in self._info["command"])
+        self.fallen = self._over = False
+
+    def walk(self, steps: int, before_step: Callable[[int], None] | None = None) -> Series:
+        """Go on for some steps, or until the fall.
+
+        Args:
+            steps: how many.
+            before_step: called with the number of each, from 0.
+
+        Returns:
+            What was measured during these steps.
+
+        Raises:
+            InvalidInputError: if the environment ends the episode before these steps are done.
+        """
+        measured, wanted, contacts, running = [], [], [], []
+        for i in range(0 if self.fallen else steps):
+            if self._over:
+                raise InvalidInputError(f"the environment ended an episode {steps - i} steps too early")
+            if before_step is not None:
+                before_step(i)
+            running.append(not self._info.get("standing", False))
+            self._obs, _, terminated, truncated, self._info = self._env.step(self._act(self._obs))
+            measured.append(self._info["base_velocity"])
+            wanted.append(self._info["filtered_command"])
+            contacts.append(self._info["contacts"])
+            self.fallen, self._over = bool(terminated), bool(terminated or truncated)
+            if self.fallen:
+                break
+        return Series(
+            measured=np.array(measured, dtype=float).reshape(-1, 3),
+            wanted=np.array(wanted, dtype=float).reshape(-1, 3),
+            contacts=np.array(contacts, dtype=bool).reshape(-1, 4),
+            running=np.array(running, dtype=bool),
+        )
+
+
+def run_all(
+    episode: Callable[..., Any], calls: Iterable[tuple[Any, ...]], count: int, n_jobs: int, progress: bool, title: str
+) -> list[Any]:
+    """Results of an episode function for several sets of arguments, in their order.
+
+    Args:
+        episode: what is called; picklable if n_jobs > 1.
+        calls: its arguments.
+        count: number of calls.
+        n_jobs: processes; 1 stays in this.
+        progress: show a bar.
+        title: of the bar.
+    """
+    if n_jobs == 1:
+        return [episode(*call) for call in tqdm(calls, title, count, disable=not progress)]
+    parallel = joblib.Parallel(n_jobs=n_jobs, return_as="generator")
+    results = parallel(joblib.delayed(WithTasks(episode))(*call) for call in calls)
+    return list(tqdm(results, title, count, disable=not progress))

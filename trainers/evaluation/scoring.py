@@ -1,0 +1,173 @@
+"""What an episode is scored by, and the scores of several."""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from go1_mtl_gym import Gait
+from trainers.evaluation.metrics import touchdowns, tracking_error, wilson_interval
+from trainers.utils.files import json_ready
+
+SETTLE_S = 2.0
+"""Start of an episode that counts for survival only [s]."""
+MIN_AIR_SHARE = 0.5
+"""A foot that was off the ground for less than this share of the gait's planned swing has bounced, not stepped."""
+VELOCITY_TOLERANCE = 0.15
+"""Largest velocity error of a success [m/s]."""
+STEP_RATE_TOLERANCE = 0.25
+"""Largest relative deviation of a leg's touchdown rate from the gait's in a success."""
+STAND_TOUCHDOWNS = 1
+"""Touchdowns that a leg may always have too many or too few of in an episode that stands for a while."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Series:
+    """What was measured after each of n steps.
+
+    Attributes:
+        measured: (vx [m/s], vy [m/s], yaw rate [rad/s]), shape (n, 3).
+        wanted: the filtered command, shape (n, 3).
+        contacts: feet on the ground, bool, shape (n, 4).
+        running: whether the gait clock ran during the step, bool, shape (n,).
+    """
+
+    measured: np.ndarray
+    wanted: np.ndarray
+    contacts: np.ndarray
+    running: np.ndarray
+
+
+@dataclasses.dataclass(frozen=True)
+class EpisodeRecord:
+    """One episode.
+
+    Attributes:
+        seed: that the environment was reset with.
+        commands: (vx, vy, yaw rate) in the order they were given.
+        survival_s: time until the fall, or the whole duration [s].
+        fallen: whether it fell.
+        velocity_error: `trainers.evaluation.metrics.tracking_error` after the first 2 s [m/s]; NaN if it fell too
+            early to tell.
+        yaw_rate_error: likewise [rad/s].
+        step_rate: touchdowns per second of each leg after the first 2 s [1/s], each after at least half a planned swing
+            in the air; NaN if it fell within them.
+        success: survived, velocity error <= 0.15 m/s, and every leg stepped at the gait's rate: within 25 % of 1 / gait
+            period times the share of the time after the first 2 s in which the gait clock ran. If the robot was to
+            stand for a while, one touchdown more or less is allowed, so one that stands throughout may make one.
+    """
+
+    seed: int
+    commands: tuple[tuple[float, float, float], ...]
+    survival_s: float
+    fallen: bool
+    velocity_error: float
+    yaw_rate_error: float
+    step_rate: tuple[float, float, float, float]
+    success: bool
+
+
+@dataclasses.dataclass(frozen=True)
+class ClosedLoopResult:
+    """Several episodes of one task.
+
+    Means of errors and rates leave out the episodes that fell too early to have one (NaN if all did).
+
+    Attributes:
+        task: name of the task.
+        seconds: duration of an episode without a fall [s].
+        episodes: the records.
+    """
+
+    task: str
+    seconds: float
+    episodes: tuple[EpisodeRecord, ...]
+
+    @property
+    def survival_rate(self) -> float:
+        """Share of episodes without a fall."""
+        return float(np.mean([not e.fallen for e in self.episodes]))
+
+    @property
+    def survival_s(self) -> float:
+        """Mean time until the fall or the end [s]."""
+        return float(np.mean([e.survival_s for e in self.episodes]))
+
+    @property
+    def velocity_error(self) -> float:
+        """Mean velocity error [m/s]."""
+        return _mean([e.velocity_error for e in self.episodes])
+
+    @property
+    def yaw_rate_error(self) -> float:
+        """Mean yaw rate error [rad/s]."""
+        return _mean([e.yaw_rate_error for e in self.episodes])
+
+    @property
+    def step_rate(self) -> float:
+        """Mean touchdowns per leg per second [1/s]."""
+        return _mean(np.ravel([e.step_rate for e in self.episodes]))
+
+    @property
+    def success_rate(self) -> float:
+        """Share of episodes that survived, tracked and stepped."""
+        return float(np.mean([e.success for e in self.episodes]))
+
+    @property
+    def success_interval(self) -> tuple[float, float]:
+        """95 % Wilson interval of the success rate."""
+        return wilson_interval(sum(e.success for e in self.episodes), len(self.episodes))
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON-ready values; NaN becomes None."""
+        names = ("survival_rate", "survival_s", "velocity_error", "yaw_rate_error", "step_rate", "success_rate")
+        summary = {name: getattr(self, name) for name in (*names, "success_interval", "task", "seconds")}
+        return json_ready(summary | {"episodes": [dataclasses.asdict(e) for e in self.episodes]})
+
+
+def score(
+    series: Series,
+    fallen: bool,
+    seed: int,
+    commands: tuple[tuple[float, float, float], ...],
+    gait: Gait,
+    control_hz: float,
+) -> EpisodeRecord:
+    """Figures of one episode.
+
+    Args:
+        series: from the time on that the gait was asked for.
+        fallen: whether it ended in a fall.
+        seed, commands: kept in the record.
+        gait: what was asked for.
+        control_hz: steps per second.
+    """
+    skip, steps = round(SETTLE_S * control_hz), len(series.measured)
+    window = max(1, round(gait.period * control_hz))
+    velocity_error, yaw_error = tracking_error(series.measured, series.wanted, window, skip)
+    counted_s = (steps - skip) / control_hz
+    rate, stepped = np.full(4, np.nan), False
+    if counted_s > 0:
+        count = touchdowns(series.contacts, math.ceil(MIN_AIR_SHARE * gait.swing_s * control_hz - 1e-9), skip)
+        running = series.running[skip:]
+        wanted_count = gait.step_rate * running.sum() / control_hz
+        stood = 0 if running.all() else STAND_TOUCHDOWNS
+        slack = max(STEP_RATE_TOLERANCE * wanted_count, stood)
+        rate, stepped = count / counted_s, bool((np.abs(count - wanted_count) <= slack + 1e-9).all())
+    return EpisodeRecord(
+        seed=seed,
+        commands=commands,
+        survival_s=steps / control_hz,
+        fallen=fallen,
+        velocity_error=velocity_error,
+        yaw_rate_error=yaw_error,
+        step_rate=tuple(rate.tolist()),
+        success=bool(not fallen and velocity_error <= VELOCITY_TOLERANCE and stepped),
+    )
+
+
+def _mean(values: Sequence[float] | np.ndarray) -> float:
+    known = [value for value in values if not math.isnan(value)]
+    return float(np.mean(known)) if known else math.nan

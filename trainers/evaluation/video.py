@@ -1,0 +1,166 @@
+"""Moving pictures of a policy or an expert at work."""
+
+import math
+from collections.abc import Mapping
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+from threadpoolctl import threadpool_limits
+
+from go1_mtl_gym.errors import InvalidInputError
+from trainers.data.environments import make_env
+from trainers.evaluation.rollout import begin, controller
+from trainers.utils.files import write_atomically
+
+COLOURS = 128
+"""Entries of the palette that all frames of a GIF share."""
+PALETTE_FRAMES = 8
+"""Frames that the palette is made from."""
+SHADOW_PIXELS = 1024
+"""Side of the shadow map; the model's own is finer and slower."""
+MAX_FPS = 50
+"""Browsers slow down GIFs that ask for more."""
+
+
+def record_frames(
+    policy_or_expert: Any,
+    task: str,
+    seconds: float = 4.0,
+    command: tuple[float, float, float] = (0.5, 0.0, 0.0),
+    seed: int = 0,
+    fps: int = 25,
+    width: int = 320,
+    height: int = 240,
+    **env_kwargs: Any,
+) -> np.ndarray:
+    """Film one episode from its standing start; after a fall the last picture stays.
+
+    Pictures are drawn at twice the size without the renderer's own anti-aliasing and averaged over 2 x 2 pixels, which
+    is smoother and, on software OpenGL, faster.
+
+    Args:
+        policy_or_expert: as in `trainers.evaluate`: a policy, an expert, or "expert".
+        task: name of the task.
+        seconds: duration [s].
+        command: (vx [m/s], vy [m/s], yaw rate [rad/s]).
+        seed: of the reset.
+        fps: pictures per second, at most the control rate.
+        width, height: of a picture [pixels].
+        env_kwargs: of the environment; on top of the policy's own ``env_kwargs``.
+
+    Returns:
+        RGB, uint8, shape (n, height, width, 3), with n = seconds times fps.
+
+    Raises:
+        InvalidInputError: if an argument is not as described.
+        go1_mtl_gym.rendering.RenderingError: if no picture can be drawn on this machine.
+    """
+    if not (seconds > 0 and 0 < fps <= MAX_FPS):
+        raise InvalidInputError(f"seconds must be > 0 and fps from 1 to {MAX_FPS}, got {seconds} and {fps}")
+    if min(width, height) < 16 or max(width, height) > 4096:
+        raise InvalidInputError(f"width and height must be from 16 to 4096 pixels, got {width} and {height}")
+    kwargs = {**getattr(policy_or_expert, "env_kwargs", {}), **env_kwargs, "episode_s": seconds + 1.0}
+    kwargs |= {"render_mode": "rgb_array", "width": 2 * width, "height": 2 * height}
+    env = make_env(task, None, **kwargs)
+    try:
+        visual = env.unwrapped.simulation.model.vis
+        visual.quality.offsamples, visual.quality.shadowsize = 0, SHADOW_PIXELS
+        visual.global_.offwidth, visual.global_.offheight = 2 * width, 2 * height
+        options = {"task": task, "command": command}
+        with threadpool_limits(1):
+            return _film(env, policy_or_expert, options, seed, max(1, round(seconds * fps)), fps)
+    finally:
+        env.close()
+
+
+def _film(env: Any, policy_or_expert: Any, options: dict[str, Any], seed: int, count: int, fps: int) -> np.ndarray:
+    base = env.unwrapped
+    act = controller(policy_or_expert, base)
+    obs, _ = begin(env, policy_or_expert, seed, options)
+    frames = [_averaged(env.render())]
+    step, terminated = 0, False
+    while len(frames) < count:
+        while step < round(len(frames) * base.control_hz / fps) and not terminated:
+            obs, _, terminated, _, _ = env.step(act(obs))
+            step += 1
+        frames.append(frames[-1] if terminated else _averaged(env.render()))
+    return np.stack(frames)
+
+
+def _averaged(picture: np.ndarray) -> np.ndarray:
+    """Half the size in both directions."""
+    height, width, _ = picture.shape
+    blocks = picture.reshape(height // 2, 2, width // 2, 2, 3).astype(np.uint16)
+    return ((blocks.sum((1, 3)) + 2) // 4).astype(np.uint8)
+
+
+def tile(frames_by_task: Mapping[str, np.ndarray], columns: int | None = None) -> np.ndarray:
+    """Several films side by side, each with its name in the upper left corner; shorter ones hold their last picture.
+
+    Args:
+        frames_by_task: name -> film, uint8, shape (n, h, w, 3); all of one h and w.
+        columns: of the mosaic; None makes it about square (four films: 2 x 2).
+
+    Returns:
+        uint8, shape (longest n, rows * h, columns * w, 3).
+
+    Raises:
+        InvalidInputError: if there is no film, or the films do not fit together.
+    """
+    films = {name: _checked(frames, f"frames of {name!r}") for name, frames in frames_by_task.items()}
+    sizes = {film.shape[1:3] for film in films.values()}
+    if len(sizes) != 1:
+        raise InvalidInputError(f"expected films of one size (height, width), got {sorted(sizes) or 'no film'}")
+    columns = math.ceil(math.sqrt(len(films))) if columns is None else columns
+    if columns < 1:
+        raise InvalidInputError(f"columns must be at least 1, got {columns}")
+    (height, width), length = sizes.pop(), max(map(len, films.values()))
+    mosaic = np.full((length, math.ceil(len(films) / columns) * height, columns * width, 3), 255, dtype=np.uint8)
+    for i, (name, film) in enumerate(films.items()):
+        row, column = divmod(i, columns)
+        where = (slice(row * height, (row + 1) * height), slice(column * width, (column + 1) * width))
+        for j in range(length):
+            mosaic[j][where] = _labelled(film[min(j, len(film) - 1)], name)
+    return mosaic
+
+
+def _labelled(picture: np.ndarray, name: str) -> np.ndarray:
+    image = Image.fromarray(picture)
+    draw = ImageDraw.Draw(image)
+    font = ImageFont.load_default(size=max(10, image.height // 13))
+    corner = (image.height // 20, image.height // 24)
+    outline = {"stroke_width": max(1, image.height // 120), "stroke_fill": (40, 44, 52)}
+    draw.text(corner, name, font=font, fill=(255, 255, 255), **outline)
+    return np.asarray(image)
+
+
+def save_gif(frames: np.ndarray, path: str | PathLike[str], fps: float = 25) -> None:
+    """Write an endlessly looping GIF; all frames share one palette made from some of them, without dithering.
+
+    The file is complete or not there. GIFs count in hundredths of a second, so 25 and 50 frames per second are exact.
+
+    Args:
+        frames: RGB, uint8, shape (n, h, w, 3).
+        path: of the file.
+        fps: frames per second, 1 ... 50.
+
+    Raises:
+        InvalidInputError: if frames or fps are not as described.
+    """
+    frames = _checked(frames, "frames")
+    if not 1 <= fps <= MAX_FPS:
+        raise InvalidInputError(f"fps must be from 1 to {MAX_FPS}, got {fps}")
+    some = frames[np.unique(np.linspace(0, len(frames) - 1, PALETTE_FRAMES).round().astype(int))]
+    palette = Image.fromarray(np.concatenate(some)).quantize(COLOURS, method=Image.Quantize.FASTOCTREE)
+    images = [Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
+    how = {"save_all": True, "append_images": images[1:], "duration": 10 * round(100 / fps), "loop": 0}
+    write_atomically(path, lambda file: images[0].save(file, format="GIF", optimize=False, **how))
+
+
+def _checked(frames: Any, what: str) -> np.ndarray:
+    frames = np.asarray(frames)
+    if frames.dtype != np.uint8 or frames.ndim != 4 or frames.shape[3] != 3 or not frames.size:
+        raise InvalidInputError(f"{what} must be uint8 of shape (n > 0, h, w, 3), got {frames.dtype} {frames.shape}")
+    return frames

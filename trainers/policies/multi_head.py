@@ -1,0 +1,279 @@
+"""The student: one network for all gaits, as a stable-baselines3 policy."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import torch
+from gymnasium import spaces
+from stable_baselines3.common.distributions import DiagGaussianDistribution
+from stable_baselines3.common.policies import ActorCriticPolicy
+from torch import nn
+
+from go1_mtl_gym import TASKS
+from go1_mtl_gym.errors import InvalidInputError
+from trainers.policies import normalization as norm
+from trainers.policies.checkpoint import SavedPolicy
+from trainers.policies.networks import MultiHeadActor, plain, seeded
+
+CRITIC_WIDTH = 64
+"""Units of each hidden layer of the value network, which behaviour cloning never evaluates."""
+
+
+def _constant_rate(_progress: float) -> float:
+    return 3e-4
+
+
+class MultiHeadPolicy(SavedPolicy, ActorCriticPolicy):
+    """Actor with a shared trunk and one head per task, chosen by the one-hot task id that ends the observation.
+
+    The trunk sees the normalised observation without the task id (clipped at `clip_sd`); the head gives the normalised
+    action; the inverse map gives the action. Only the heads that a batch names are computed, only these get gradients.
+    Exploration noise (for PPO and friends) is a diagonal Gaussian that does not depend on the state; the critic is
+    small and not evaluated when cloning.
+
+    Args:
+        observation_space: flat Box of size D; its last `n_tasks` entries are the one-hot task id.
+        action_space: flat Box of the actions.
+        lr_schedule: progress -> learning rate of `optimizer`; stable-baselines3 passes its own.
+        width: units of every hidden layer of the actor (the paper: 2560).
+        n_tasks: number of tasks K; None means those of `env_kwargs`, or all that are registered.
+        pooled: the baseline that ignores the task id: one head for all tasks, same depth as one path of the multi-head.
+        normalization: "mean_std", "min_max" or "none"; used by `fit_normalization`.
+        clip_sd: normalised inputs are clipped to +- this.
+        env_kwargs: what `gymnasium.make` needs for the environment it was trained for; travels with `save`.
+        log_std_init: initial log standard deviation of the exploration noise, in units of the action.
+        seed: of the initial weights, without touching torch's global generator; None draws from that generator.
+        optimizer_class: for on-policy learning.
+        optimizer_kwargs: of `optimizer_class`, without the learning rate.
+
+    Raises:
+        InvalidInputError: if an argument is not as described.
+    """
+
+    def __init__(
+        self,
+        observation_space: spaces.Space,
+        action_space: spaces.Space,
+        lr_schedule: Any = _constant_rate,
+        *,
+        width: int = 256,
+        n_tasks: int | None = None,
+        pooled: bool = False,
+        normalization: str = "mean_std",
+        clip_sd: float = 6.0,
+        env_kwargs: Mapping[str, Any] | None = None,
+        log_std_init: float = -1.0,
+        seed: int | None = None,
+        optimizer_class: type[torch.optim.Optimizer] = torch.optim.Adam,
+        optimizer_kwargs: dict[str, Any] | None = None,
+        use_sde: bool = False,
+    ) -> None:
+        env_kwargs = dict(env_kwargs or {})
+        if n_tasks is None:  # tasks that are registered later are none of this policy's
+            env_kwargs["tasks"] = tuple(env_kwargs.get("tasks") or TASKS)
+            n_tasks = len(env_kwargs["tasks"])
+        _check_arguments(observation_space, action_space, width, n_tasks, normalization, clip_sd, use_sde)
+        self.width = int(width)
+        self.n_tasks = int(n_tasks)
+        self.pooled = bool(pooled)
+        self.normalization = normalization
+        self.clip_sd = float(clip_sd)
+        self.env_kwargs = env_kwargs
+        self.seed = seed
+        super().__init__(
+            observation_space,
+            action_space,
+            lr_schedule,
+            log_std_init=log_std_init,
+            optimizer_class=optimizer_class,
+            optimizer_kwargs=optimizer_kwargs,
+        )
+
+    # -- Construction, as stable-baselines3 calls it -------------------------------------------------------------------
+
+    def _build(self, lr_schedule: Any) -> None:
+        n_inputs = int(self.observation_space.shape[0]) - self.n_tasks
+        n_actions = int(self.action_space.shape[0])
+        with seeded(self.seed):
+            self.actor = MultiHeadActor(n_inputs, n_actions, 1 if self.pooled else self.n_tasks, self.width)
+            self.critic = plain(n_inputs + self.n_tasks, 1, CRITIC_WIDTH)
+        self.obs_normalizer = norm.Normalizer(n_inputs)
+        self.act_normalizer = norm.Normalizer(n_actions)
+        self.log_std = nn.Parameter(torch.full((n_actions,), float(self.log_std_init)))
+        self.optimizer = self.optimizer_class(self.parameters(), lr=lr_schedule(1), **self.optimizer_kwargs)
+
+    def network_kwargs(self) -> dict[str, Any]:
+        """Constructor arguments that shape the network: also ``policy_kwargs`` for a PPO that starts from it."""
+        return {
+            "width": self.width,
+            "n_tasks": self.n_tasks,
+            "pooled": self.pooled,
+            "normalization": self.normalization,
+            "clip_sd": self.clip_sd,
+            "env_kwargs": self.env_kwargs,
+            "log_std_init": self.log_std_init,
+        }
+
+    def _get_constructor_parameters(self) -> dict[str, Any]:
+        """All that rebuilds an equal policy; stable-baselines3 reads it."""
+        return {
+            "observation_space": self.observation_space,
+            "action_space": self.action_space,
+            "lr_schedule": _constant_rate,
+            "optimizer_class": self.optimizer_class,
+            "optimizer_kwargs": self.optimizer_kwargs,
+            "seed": self.seed,
+            **self.network_kwargs(),
+        }
+
+    def fit_normalization(self, obs: np.ndarray, acts: np.ndarray, binary: np.ndarray | None = None) -> None:
+        """Take shift and scale of inputs and outputs from demonstrations, by the mode in `normalization`.
+
+        Args:
+            obs: observations with task id, shape (n, D).
+            acts: actions, shape (n, 12).
+            binary: bool mask of inputs to leave at 0 and 1, shape (D - K,); None finds columns that hold nothing else.
+
+        Raises:
+            InvalidInputError: if a shape is wrong or a value is not finite.
+        """
+        obs, acts = np.asarray(obs), np.asarray(acts)
+        for value, space, what in ((obs, self.observation_space, "obs"), (acts, self.action_space, "acts")):
+            if value.ndim != 2 or value.shape[1:] != space.shape:
+                raise InvalidInputError(f"{what} must have shape (n, {space.shape[0]}), got {value.shape}")
+        self.obs_normalizer.set(*norm.fit(obs[:, : -self.n_tasks], self.normalization, binary))
+        self.act_normalizer.set(*norm.fit(acts, self.normalization, np.zeros(acts.shape[1], dtype=bool)))
+
+    def add_task(self, name: str, seed: int = 0, like: str | None = None) -> "MultiHeadPolicy":
+        """A new policy that knows one task more, the last in its task id; this one stays as it is.
+
+        Its space of observations is one entry longer, so whoever holds this policy and its spaces must take the new one
+        instead. Trunk, heads, normalisation, critic and exploration noise are copies: in the old tasks it acts as this
+        one does, to the bit. The new head is untrained (see `trainers.learn_task`), and the critic does not see the new
+        task's entry yet.
+
+        Args:
+            name: of a registered task that this policy does not have.
+            seed: of the new head's weights.
+            like: name of a task of this policy whose head the new one begins as a copy of (see
+                `trainers.closest_task`); None draws its weights.
+
+        Raises:
+            InvalidInputError: if the task is unknown or there already, `like` is not there, or this policy is pooled.
+        """
+        from trainers.algorithms.add_task import add_task
+
+        return add_task(self, name, seed, like)
+
+    # -- The actor -----------------------------------------------------------------------------------------------------
+
+    def task_index(self, obs: torch.Tensor) -> torch.Tensor:
+        """Index of each row's task, int64, shape (n,)."""
+        return obs[:, -self.n_tasks :].argmax(dim=1)
+
+    def mean_actions(self, obs: torch.Tensor, rows: Sequence[int] | None = None) -> torch.Tensor:
+        """The deterministic actions, not clipped to the action space, shape (n, 12).
+
+        Args:
+            obs: shape (n, D), any mix of tasks.
+            rows: how many there are of each task if they come sorted by task; None looks them up.
+        """
+        if rows is None:
+            return self._means(self._normalised(obs), obs)
+        return self.act_normalizer.inverse(self.actor.in_blocks(self._normalised(obs), rows))
+
+    def _normalised(self, obs: torch.Tensor) -> torch.Tensor:
+        return self.obs_normalizer(obs[:, : -self.n_tasks].float()).clamp(-self.clip_sd, self.clip_sd)
+
+    def _means(self, normalised: torch.Tensor, obs: torch.Tensor) -> torch.Tensor:
+        return self.act_normalizer.inverse(self.actor(normalised, self.task_index(obs)))
+
+    def _values(self, normalised: torch.Tensor, obs: torch.Tensor) -> torch.Tensor:
+        return self.critic(torch.cat([normalised, obs[:, -self.n_tasks :].float()], dim=1))
+
+    def _gaussian(self, means: torch.Tensor) -> DiagGaussianDistribution:
+        return self.action_dist.proba_distribution(means, self.log_std)
+
+    # -- What stable-baselines3 calls ----------------------------------------------------------------------------------
+
+    def forward(
+        self, obs: torch.Tensor, deterministic: bool = False
+    ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+        """Actions (n, 12), values (n, 1) and log probabilities (n,)."""
+        normalised = self._normalised(obs)
+        distribution = self._gaussian(self._means(normalised, obs))
+        actions = distribution.get_actions(deterministic=deterministic)
+        return actions, self._values(normalised, obs), distribution.log_prob(actions)
+
+    def evaluate_actions(
+        self, obs: torch.Tensor, actions: torch.Tensor
+    ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor | None]:
+        """Values (n, 1), log probabilities (n,) and entropies (n,) of given actions."""
+        normalised = self._normalised(obs)
+        distribution = self._gaussian(self._means(normalised, obs))
+        return self._values(normalised, obs), distribution.log_prob(actions), distribution.entropy()
+
+    def get_distribution(self, obs: torch.Tensor) -> DiagGaussianDistribution:
+        """Distribution of the actions."""
+        return self._gaussian(self.mean_actions(obs))
+
+    def predict_values(self, obs: torch.Tensor) -> torch.Tensor:
+        """Values, shape (n, 1)."""
+        return self._values(self._normalised(obs), obs)
+
+    def set_training_mode(self, mode: bool) -> None:
+        """Switch between training and evaluation; `predict` asks for it each time, and walking all modules is slow."""
+        if mode != self.training:
+            super().set_training_mode(mode)
+
+    def _predict(self, observation: torch.Tensor, deterministic: bool = False) -> torch.Tensor:
+        means = self.mean_actions(observation)
+        return means if deterministic else self._gaussian(means).get_actions()
+
+    def predict(
+        self,
+        observation: np.ndarray,
+        state: tuple[np.ndarray, ...] | None = None,
+        episode_start: np.ndarray | None = None,
+        deterministic: bool = False,
+    ) -> tuple[np.ndarray, tuple[np.ndarray, ...] | None]:
+        """Actions of one observation (D,) or a batch (n, D) of any mix of tasks, clipped to the action space.
+
+        Raises:
+            InvalidInputError: if an observation is not finite, or does not end in a one-hot task id.
+        """
+        if isinstance(observation, np.ndarray) and observation.shape[-1:] == self.observation_space.shape:
+            self._check_observation(observation)
+        return super().predict(observation, state, episode_start, deterministic)
+
+    def _check_observation(self, obs: np.ndarray) -> None:
+        if not np.isfinite(obs).all():
+            raise InvalidInputError("observation must be finite, got NaN or infinity")
+        task = obs[..., -self.n_tasks :]
+        if not self.pooled and not ((task.sum(-1) == 1.0) & (task.max(-1) == 1.0)).all():
+            row = task.reshape(-1, self.n_tasks)
+            row = row[(row.sum(-1) != 1.0) | (row.max(-1) != 1.0)][0]
+            raise InvalidInputError(
+                f"the last {self.n_tasks} entries of an observation must be a one-hot task id, got {row.tolist()}"
+            )
+
+    # -- Files ---------------------------------------------------------------------------------------------------------
+
+
+def _check_arguments(
+    observation_space: Any, action_space: Any, width: int, n_tasks: int, normalization: str, clip_sd: float, sde: bool
+) -> None:
+    if not isinstance(n_tasks, (int, np.integer)) or n_tasks < 1:
+        raise InvalidInputError(f"n_tasks must be a positive integer or None, got {n_tasks!r}")
+    if not isinstance(width, (int, np.integer)) or width < 1:
+        raise InvalidInputError(f"width must be a positive integer, got {width!r}")
+    for space, smallest, what in ((observation_space, n_tasks, "observation_space"), (action_space, 0, "action_space")):
+        if not isinstance(space, spaces.Box) or len(space.shape) != 1 or space.shape[0] <= smallest:
+            raise InvalidInputError(f"{what} must be a flat Box of more than {smallest} entries, got {space}")
+    if normalization not in norm.MODES:
+        raise InvalidInputError(f"normalization must be one of {', '.join(norm.MODES)}; got {normalization!r}")
+    if not clip_sd > 0:
+        raise InvalidInputError(f"clip_sd must be positive, got {clip_sd!r}")
+    if sde:
+        raise InvalidInputError("use_sde is not supported: the exploration noise does not depend on the state")
