@@ -63,7 +63,7 @@ class Job:
         """All stages, in order; returns what ``metrics.json`` holds."""
         train, held_out = self.demonstrations()
         student = self.student(train, held_out)
-        policies = {"multi_head": student} | self.clockless(student) | self.baselines()
+        policies = {"multi_head": student} | self.phase_free(student) | self.baselines()
         metrics = self.evaluate(policies, held_out)
         draw(self.config, self.out, student, held_out, self.logger, NO_GL)
         return metrics
@@ -146,25 +146,25 @@ class Job:
         }
         trainers.log_round(self.logger, round_num, closed_loop, trainers.offline_metrics(policy, held_out))
 
-    def clockless(self, student: Any) -> dict[str, Any]:
+    def phase_free(self, student: Any) -> dict[str, Any]:
         """The student with an estimate of the phase in its clock's place, where it has a clock."""
-        config, path = self.config, self.out / "clockless.zip"
-        if not (config.clockless_s and config.has_clock):
+        config, path = self.config, self.out / "phase_free.zip"
+        if not (config.phase_free_s and config.has_clock):
             return {}
         if not path.is_file():
-            with self.stage("clockless"):
-                policy = trainers.learn_without_clock(
+            with self.stage("phase_free"):
+                policy = trainers.train_phase_free(
                     student,
-                    config.clockless_s,
-                    config.clockless_history,
+                    config.phase_free_s,
+                    config.phase_free_history,
                     perturbation=config.disturbed(NOISE_RAD),
-                    config=trainers.PhaseConfig(steps=config.clockless_steps, seed=config.seed),
+                    config=trainers.PhaseConfig(steps=config.phase_free_steps, seed=config.seed),
                     seed=config.seed,
                     progress=True,
                     **config.world,
                 )
             policy.save(path)
-        return {"clockless": trainers.load(path)}
+        return {"phase_free": trainers.load(path)}
 
     def baselines(self) -> dict[str, Any]:
         """The pooled and the paper-literal student, on the same rows with as many gradient steps, side by side."""
@@ -193,7 +193,7 @@ class Job:
         config = self.config
         tasks: dict[str, dict[str, Any]] = {task: {} for task in config.tasks}
         for name, policy in policies.items():
-            if name == "clockless":  # these rows hold one frame, it needs several
+            if name == "phase_free":  # these rows hold one frame, it needs several
                 continue
             rows = held_out.proprioceptive() if name == "paper_literal" else held_out
             for task, scores in trainers.offline_metrics(policy, rows).items():

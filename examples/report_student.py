@@ -4,8 +4,8 @@ python examples/report_student.py robustness --policy runs/default/policy.zip   
 python examples/report_student.py switching pushes --policy randomised=a.zip --policy nominal=b.zip     two students
 python examples/report_student.py commanded --seeds 0 1 2 3 4          makes its own five students, in some hours
 python examples/report_student.py ablation                     makes its own, which differ in one setting each, in one
-python examples/report_student.py budget clockless           the same, in less than an hour each; with their own seeds
-python examples/report_student.py clockless --policy clockless=c.zip     and a finished one without a clock beside them
+python examples/report_student.py budget phase_free           the same, in less than an hour each; with their own seeds
+python examples/report_student.py phase_free --policy phase_free=c.zip     and a finished one without a clock
 python examples/report_student.py robustness --quick --policy a.zip --out-dir runs/quick            a minute's worth
 
 Every section has its own file and figure, which hold what this command asked for and nothing else; whatever part was
@@ -40,7 +40,7 @@ OUT = Path("docs/results")
 PARTS = Path("runs/student")
 OWN = tuple(name for name, section in SECTIONS.items() if section.school or section.prepare)
 """Sections that make their own students."""
-BESIDE = ("clockless",)
+BESIDE = ("phase_free",)
 """Those of them that measure given ones beside them, if there are any."""
 
 

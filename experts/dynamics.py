@@ -1,4 +1,4 @@
-"""The MPC's prediction model: a single rigid body pushed by four feet, linearised along a trajectory.
+"""The MPC's prediction model: a single rigid body pushed by four feet, linearized along a trajectory.
 
 State x = [rpy, p, omega, v] (attitude as roll-pitch-yaw, centre of mass, angular velocity, velocity; world frame) and
 input u = the four ground forces in the world, in units of half the robot's weight. The nonlinear model is
@@ -50,20 +50,20 @@ class LinearModel:
     c: np.ndarray
 
 
-def linearise(
+def linearize(
     states: np.ndarray, inputs: np.ndarray, feet_w: np.ndarray, inertia_b: np.ndarray, dt: float
 ) -> LinearModel:
     """Equations (5)-(7) along a trajectory.
 
     Args:
-        states: x at the N + 1 ends of the intervals, shape (N + 1, 12); an interval is linearised in its middle.
+        states: x at the N + 1 ends of the intervals, shape (N + 1, 12); an interval is linearized in its middle.
         inputs: u during the intervals, shape (N, 12).
         feet_w: where the feet push from, world [m], shape (N, 4, 3).
         inertia_b: composite inertia about the centre of mass, trunk axes [kg m^2], shape (3, 3).
         dt: interval [s].
     """
     middle = (states[:-1] + states[1:]) / 2
-    return LinearModel(*_linearise(middle, inputs * FORCE_UNIT, feet_w, inertia_b, np.linalg.inv(inertia_b), dt))
+    return LinearModel(*_linearize(middle, inputs * FORCE_UNIT, feet_w, inertia_b, np.linalg.inv(inertia_b), dt))
 
 
 @njit(cache=True)
@@ -108,8 +108,8 @@ def _congruent(R, inner, out):
 
 
 @njit(cache=True)
-def _linearise(x, forces, feet_w, inertia_b, inverse_b, dt):
-    """`linearise` at states x with forces in N; compiled, without temporary arrays inside the loop."""
+def _linearize(x, forces, feet_w, inertia_b, inverse_b, dt):
+    """`linearize` at states x with forces in N; compiled, without temporary arrays inside the loop."""
     steps, half = len(x), dt * dt / 2
     A, B, c = np.zeros((steps, 12, 12)), np.zeros((steps, 12, 12)), np.zeros((steps, 12))
     R, E, W, K, G = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))

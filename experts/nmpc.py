@@ -2,16 +2,16 @@
 
 One call runs once through the chain
 
-    state -> Pinocchio -> reference and footholds -> rigid-body model, linearised -> QP -> ground forces
+    state -> Pinocchio -> reference and footholds -> rigid-body model, linearized -> QP -> ground forces
           -> whole-body torques -> joint targets of the PD actuators.
 
 What is nonlinear in it. The model of `experts.dynamics` is: attitude kinematics, lever arms, gyroscopic moments, an
-inertia that is computed anew from the configuration at every call. Each call linearises it along the reference and
-solves a QP, as convex MPC does. If the solution stays within `sqp_tolerance` of the trajectory that it was linearised
-along, as it does in steady walking, that is all; if not, as after a push, the model is linearised again along the
+inertia that is computed anew from the configuration at every call. Each call linearizes it along the reference and
+solves a QP, as convex MPC does. If the solution stays within `sqp_tolerance` of the trajectory that it was linearized
+along, as it does in steady walking, that is all; if not, as after a push, the model is linearized again along the
 solution, up to `sqp_iterations` QPs: sequential quadratic programming on the nonlinear program, cut short by default
 and converged with a small tolerance and many iterations. Either way the answer depends on the state alone.
-``linearisation="shifted"`` begins at the last call's solution instead, moved on by the time that has passed: with
+``linearization="shifted"`` begins at the last call's solution instead, moved on by the time that has passed: with
 ``sqp_iterations=1`` a real-time iteration (M. Diehl et al., 2005), which converges from call to call and remembers.
 
 The actuators hold a joint target for a whole control period, during which the joints move on. The target is therefore
@@ -29,7 +29,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from experts.dynamics import COM, FORCE_UNIT, RPY, linearise
+from experts.dynamics import COM, FORCE_UNIT, RPY, linearize
 from experts.footholds import FootholdRule
 from experts.jacobian_transpose import jacobian_transpose_torques
 from experts.model import Dynamics, RobotModel
@@ -62,9 +62,9 @@ class NMPCConfig:
 
     Attributes:
         com_height: mean height of the centre of mass [m].
-        linearisation: "reference", or "shifted" for real-time iterations, which remember the last solution.
+        linearization: "reference", or "shifted" for real-time iterations, which remember the last solution.
         sqp_iterations: most QPs per call.
-        sqp_tolerance: a QP whose solution is as near as this to the trajectory that it was linearised along is the
+        sqp_tolerance: a QP whose solution is as near as this to the trajectory that it was linearized along is the
             last: attitude [rad], and position in units of `com_height`.
         whole_body: how forces become torques: a name from `WHOLE_BODY`.
         mpc_hz: rate at which forces are planned anew [Hz], the whole body being solved at every call; None plans at
@@ -78,7 +78,7 @@ class NMPCConfig:
     """
 
     com_height: float = 0.28
-    linearisation: str = "reference"
+    linearization: str = "reference"
     sqp_iterations: int = 3
     sqp_tolerance: float = 0.2
     whole_body: str = "closed_form"
@@ -89,7 +89,7 @@ class NMPCConfig:
 
     def __post_init__(self) -> None:
         number_in(self.com_height, 0.15, 0.34, "com_height [m]")
-        one_of(self.linearisation, ("reference", "shifted"), "linearisation")
+        one_of(self.linearization, ("reference", "shifted"), "linearization")
         number_in(self.sqp_iterations, 1, 100, "sqp_iterations")
         number_in(self.sqp_tolerance, 0.0, 10.0, "sqp_tolerance")
         one_of(self.whole_body, tuple(WHOLE_BODY), "whole_body")
@@ -189,7 +189,7 @@ class NMPCExpert:
             if held is not None:
                 return held.forces_w(state.time_s)
         trajectory = self.plan(state, dynamics)
-        if self.config.mpc_hz is not None or self.config.linearisation == "shifted":
+        if self.config.mpc_hz is not None or self.config.linearization == "shifted":
             self._recall.store(trajectory)
         return trajectory.forces_w(state.time_s)
 
@@ -221,11 +221,11 @@ class NMPCExpert:
         inertia_b = state.rotation.T @ dynamics.inertia_w @ state.rotation
 
         states, inputs = reference, nominal
-        earlier = self._recall.before(state) if config.linearisation == "shifted" else None
+        earlier = self._recall.before(state) if config.linearization == "shifted" else None
         if earlier is not None:
             states, inputs = earlier.shifted(state.time_s, frame, reference, nominal)
         for _ in range(config.sqp_iterations):
-            model = linearise(states, inputs, feet, inertia_b, dt)
+            model = linearize(states, inputs, feet, inertia_b, dt)
             solution = self._mpc.solve(model, x0, reference[1:], nominal, contact)
             self.counters.count(solution)
             if not solution.usable:

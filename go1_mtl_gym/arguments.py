@@ -12,7 +12,7 @@ from go1_mtl_gym.sensing.observation import SensorNoise
 from go1_mtl_gym.sensing.state_estimator import StateEstimatorConfig
 from go1_mtl_gym.sensing.state_noise import EstimatorNoise
 from go1_mtl_gym.sim.domain_randomization import DomainRandomization
-from go1_mtl_gym.sim.physics_params import Realism
+from go1_mtl_gym.sim.physics_params import PhysicsParams
 from go1_mtl_gym.sim.simulation import PHYSICS_HZ
 from go1_mtl_gym.tasks import TASKS
 from go1_mtl_gym.validation import number_in, one_of
@@ -62,15 +62,15 @@ def check_conditions(given: Mapping[str, Any], figures: Mapping[str, Any]) -> Co
     Args:
         given: the environment's arguments by name, among them noise, estimator_noise, state_estimator
             and randomization.
-        figures: all further keyword arguments; those of `Realism`.
+        figures: all further keyword arguments; those of `PhysicsParams`.
 
     Raises:
         InvalidInputError: for an unknown name, an impossible figure, or both ways to estimate a state.
     """
     for name in figures:
-        one_of(name, (*given, *(each.name for each in fields(Realism))), "argument of Go1Env")
+        one_of(name, (*given, *(each.name for each in fields(PhysicsParams))), "argument of Go1Env")
     return Conditions(
-        Realism(**figures),
+        PhysicsParams(**figures),
         check_switch(given["noise"], SensorNoise, "noise"),
         check_switch(given["estimator_noise"], EstimatorNoise, "estimator_noise"),
         check_switch(given["state_estimator"], StateEstimatorConfig, "state_estimator"),

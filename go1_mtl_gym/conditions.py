@@ -10,7 +10,7 @@ from go1_mtl_gym.sensing.observation import SensorNoise
 from go1_mtl_gym.sensing.state_estimator import StateEstimator, StateEstimatorConfig
 from go1_mtl_gym.sensing.state_noise import EstimatorError, EstimatorNoise
 from go1_mtl_gym.sim.domain_randomization import DomainRandomization
-from go1_mtl_gym.sim.physics_params import Realism
+from go1_mtl_gym.sim.physics_params import PhysicsParams
 from go1_mtl_gym.sim.simulation import Simulation
 
 EXPERTS_ALONE = ("estimator_noise", "state_estimator")
@@ -22,7 +22,7 @@ class Conditions:
     """The environment's own conditions, and how an episode's are drawn.
 
     Attributes:
-        realism: what is different about the physics.
+        physics_params: what is different about the physics.
         sensor_noise: of the sensors, or None.
         estimator_noise: on the state that the expert sees, or None.
         state_estimator: that tells the expert the state from the sensors, or None.
@@ -33,7 +33,7 @@ class Conditions:
             estimator and another's noise.
     """
 
-    realism: Realism
+    physics_params: PhysicsParams
     sensor_noise: SensorNoise | None
     estimator_noise: EstimatorNoise | None
     state_estimator: StateEstimatorConfig | None
@@ -53,7 +53,7 @@ class Conditions:
 
         Args:
             episode: gets `sensor_noise`, `estimator_error` and `state_estimator`.
-            simulation: gets its realism if there is a randomization, and is left alone otherwise.
+            simulation: gets its physics_params if there is a randomization, and is left alone otherwise.
             rng: gives one number for the estimator noise and one for the randomization, whatever is drawn from them.
         """
         episode.sensor_noise = self.sensor_noise
@@ -63,8 +63,8 @@ class Conditions:
             episode.state_estimator = StateEstimator(self.state_estimator)
         if self.randomization is not None:
             own = np.random.default_rng(int(rng.integers(2**63)))
-            realism, factor = self.randomization.draw(own, self.realism)
-            simulation.set_realism(realism)
+            physics_params, factor = self.randomization.draw(own, self.physics_params)
+            simulation.set_physics_params(physics_params)
             if factor is not None:
                 episode.sensor_noise = self._scaled_noise(factor)
 

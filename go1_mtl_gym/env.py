@@ -21,7 +21,7 @@ from go1_mtl_gym.sensing.state_estimator import StateEstimatorConfig
 from go1_mtl_gym.sensing.state_noise import EstimatorNoise
 from go1_mtl_gym.sensors import Observer
 from go1_mtl_gym.sim.domain_randomization import DomainRandomization
-from go1_mtl_gym.sim.physics_params import Realism
+from go1_mtl_gym.sim.physics_params import PhysicsParams
 from go1_mtl_gym.sim.simulation import PHYSICS_HZ, Simulation
 from go1_mtl_gym.tasks import TASKS, Task, check_task_names
 from go1_mtl_gym.termination import how_it_ended
@@ -69,7 +69,8 @@ class Go1Env(gymnasium.Env):
             must give an object with ``reset(state)`` and ``action(state)``, which returns 12 joint targets [rad] for a
             `RobotState`.
         render_mode, width, height: None, "human" or "rgb_array", and the size of the picture [pixels].
-        realism: differences from the expert's model: ``friction=``, ``payload_kg=`` and the other fields of `Realism`.
+        physics_params: differences from the expert's model: ``friction=``, ``payload_kg=`` and the other fields of
+            `PhysicsParams`.
 
     Raises:
         InvalidInputError: if an argument is not as described.
@@ -96,10 +97,10 @@ class Go1Env(gymnasium.Env):
         render_mode: str | None = None,
         width: int = 640,
         height: int = 480,
-        **realism: float | None,
+        **physics_params: float | None,
     ) -> None:
-        given = {name: value for name, value in locals().items() if name not in ("self", "__class__", "realism")}
-        self._arguments = given | realism
+        given = {name: value for name, value in locals().items() if name not in ("self", "__class__", "physics_params")}
+        self._arguments = given | physics_params
         self.tasks = self._arguments["tasks"] = check_task_names(tuple(TASKS) if tasks is None else tasks)
         if task is not None:
             one_of(task, self.tasks, "task")
@@ -114,8 +115,8 @@ class Go1Env(gymnasium.Env):
         self.render_mode = render_mode
         self._observer = Observer(self.layout, self.tasks, self.control_s)
         self._episode_steps = round(number_in(episode_s, self.control_s, 1e6, "episode_s") * self.control_hz)
-        self._conditions = arguments.check_conditions(given, realism)
-        self._simulation = Simulation(self.gains, self._conditions.realism)
+        self._conditions = arguments.check_conditions(given, physics_params)
+        self._simulation = Simulation(self.gains, self._conditions.physics_params)
         self._make_expert = check_expert(expert)
         self._expert: Any = None
         self._renderer: Any = None
@@ -211,9 +212,9 @@ class Go1Env(gymnasium.Env):
         return self._running("command").command.copy()
 
     @property
-    def realism(self) -> Realism:
+    def physics_params(self) -> PhysicsParams:
         """What is different about the physics now."""
-        return self._simulation.realism
+        return self._simulation.physics_params
 
     @property
     def simulation(self) -> Simulation:

@@ -12,9 +12,9 @@ from go1_mtl_gym.sensing.state import RobotState
 from go1_mtl_gym.sim.simulation import Simulation
 
 CAMERA = "track"
-COMMAND_COLOUR = (0.15, 0.75, 0.30, 0.9)
-VELOCITY_COLOUR = (0.20, 0.45, 0.95, 0.9)
-CONTACT_COLOUR = (0.98, 0.55, 0.10, 0.8)
+COMMAND_COLOR = (0.15, 0.75, 0.30, 0.9)
+VELOCITY_COLOR = (0.20, 0.45, 0.95, 0.9)
+CONTACT_COLOR = (0.98, 0.55, 0.10, 0.8)
 ARROW_S = 0.6
 """Length of an arrow per speed [m per m/s]."""
 
@@ -28,28 +28,28 @@ def annotate(scene: mujoco.MjvScene, simulation: Simulation, state: RobotState) 
     for foot, contact in zip(simulation.feet_w, state.contacts, strict=True):
         if contact:
             size = [2.2 * FOOT_RADIUS, 2.2 * FOOT_RADIUS, 0.002]
-            _add(scene, mujoco.mjtGeom.mjGEOM_ELLIPSOID, size, [*foot[:2], 0.003], CONTACT_COLOUR)
+            _add(scene, mujoco.mjtGeom.mjGEOM_ELLIPSOID, size, [*foot[:2], 0.003], CONTACT_COLOR)
     yaw = state.rpy[2]
     turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
     above = state.position_w + [0.0, 0.0, 0.22]
-    for velocity, colour, lift in (
-        (state.command, COMMAND_COLOUR, 0.03),
-        (state.base_velocity, VELOCITY_COLOUR, 0.0),
+    for velocity, color, lift in (
+        (state.command, COMMAND_COLOR, 0.03),
+        (state.base_velocity, VELOCITY_COLOR, 0.0),
     ):
         tip = above + np.append(turn @ velocity[:2] * ARROW_S, lift)
         start = above + [0.0, 0.0, lift]
         if np.linalg.norm(tip - start) > 0.02:
-            geom = _add(scene, mujoco.mjtGeom.mjGEOM_ARROW, np.zeros(3), np.zeros(3), colour)
+            geom = _add(scene, mujoco.mjtGeom.mjGEOM_ARROW, np.zeros(3), np.zeros(3), color)
             if geom is not None:
                 mujoco.mjv_connector(geom, mujoco.mjtGeom.mjGEOM_ARROW, 0.012, start, tip)
 
 
-def _add(scene: mujoco.MjvScene, kind: int, size: list, position: list, colour: tuple) -> mujoco.MjvGeom | None:
+def _add(scene: mujoco.MjvScene, kind: int, size: list, position: list, color: tuple) -> mujoco.MjvGeom | None:
     if scene.ngeom >= scene.maxgeom:
         return None
     geom = scene.geoms[scene.ngeom]
     scene.ngeom += 1
-    mujoco.mjv_initGeom(geom, kind, np.array(size), np.array(position), np.eye(3).ravel(), np.array(colour, np.float32))
+    mujoco.mjv_initGeom(geom, kind, np.array(size), np.array(position), np.eye(3).ravel(), np.array(color, np.float32))
     return geom
 
 

@@ -1,4 +1,4 @@
-"""What makes demonstrations worth learning from: noise on actions, kicks, and commands and tasks that change."""
+"""What makes demonstrations worth learning from: noise on actions, pushes, and commands and tasks that change."""
 
 from typing import Any
 
@@ -18,7 +18,7 @@ class PerturbationWrapper(gymnasium.Wrapper):
 
     Four disturbances, each drawn from this wrapper's own generator (seeded by ``reset(seed=...)``):
     first-order autoregressive noise on the executed action, its standard deviation drawn per episode from
-    U(0, `noise_rad`); horizontal kicks of the trunk's velocity, uniform in a disc of radius `kick`, at exponentially
+    U(0, `noise_rad`); horizontal pushes of the trunk's velocity, uniform in a disc of radius `push`, at exponentially
     distributed times; commands redrawn from the task's range; and changes to another of the environment's tasks, which
     begin as `Go1Env.set_task` says. `expert_action` is untouched: it answers for the true state, so the labels are
     clean.
@@ -26,11 +26,11 @@ class PerturbationWrapper(gymnasium.Wrapper):
     Args:
         env: a `Go1Env`, wrapped or not.
         noise_rad: largest standard deviation of the noise [rad].
-        kick: largest change of velocity [m/s].
-        kick_interval: mean time between kicks [s].
+        push: largest change of velocity [m/s].
+        push_interval: mean time between pushes [s].
         command_interval: shortest and longest time between commands [s], or None to leave the command alone.
-        corner_share: probability with which a redrawn command is a corner of the task's range, every component at plus
-            or minus its largest; the others are uniform. The command of a reset is the environment's own.
+        corner_fraction: probability with which a redrawn command is a corner of the task's range, every component at
+            plus or minus its largest; the others are uniform. The command of a reset is the environment's own.
         task_interval: shortest and longest time between changes of task [s], or None to leave the task alone. A command
             beyond the new task's range is brought to its border.
 
@@ -42,18 +42,18 @@ class PerturbationWrapper(gymnasium.Wrapper):
         self,
         env: gymnasium.Env,
         noise_rad: float = 0.06,
-        kick: float = 0.2,
-        kick_interval: float = 1.5,
+        push: float = 0.2,
+        push_interval: float = 1.5,
         command_interval: tuple[float, float] | None = (1.5, 4.0),
-        corner_share: float = 0.0,
+        corner_fraction: float = 0.0,
         task_interval: tuple[float, float] | None = None,
     ) -> None:
         super().__init__(env)
         self._noise_rad = number_in(noise_rad, 0.0, 1.0, "noise_rad [rad]")
-        self._kick = number_in(kick, 0.0, 5.0, "kick [m/s]")
-        self._kick_interval = number_in(kick_interval, 0.01, 1e6, "kick_interval [s]")
+        self._push_speed = number_in(push, 0.0, 5.0, "push [m/s]")
+        self._push_interval = number_in(push_interval, 0.01, 1e6, "push_interval [s]")
         self._command_interval = interval_s(command_interval, "command_interval")
-        self._corner_share = number_in(corner_share, 0.0, 1.0, "corner_share")
+        self._corner_fraction = number_in(corner_fraction, 0.0, 1.0, "corner_fraction")
         self._task_interval = interval_s(task_interval, "task_interval")
         if task_interval is not None and len(env.unwrapped.tasks) < 2:
             raise InvalidInputError(f"task_interval must be None for an environment of one task, got {task_interval}")
@@ -66,7 +66,7 @@ class PerturbationWrapper(gymnasium.Wrapper):
         result = self.env.reset(seed=seed, options=options)
         self._sigma = self._rng.uniform(0.0, self._noise_rad) / self.env.unwrapped.action_map.half_range
         self._noise = self._sigma * self._rng.standard_normal(12)
-        self._next_kick = self._rng.exponential(self._kick_interval)
+        self._next_push = self._rng.exponential(self._push_interval)
         self._next_command = self._draw_time(self._command_interval)
         self._next_task = self._draw_time(self._task_interval)
         self._time = 0.0
@@ -83,9 +83,9 @@ class PerturbationWrapper(gymnasium.Wrapper):
         keep = np.exp(-env.control_s / NOISE_CORRELATION_S)
         self._noise = keep * self._noise + np.sqrt(1 - keep**2) * self._sigma * self._rng.standard_normal(12)
         self._time += env.control_s
-        if self._time >= self._next_kick:
-            self._next_kick = self._time + self._rng.exponential(self._kick_interval)
-            size, angle = self._kick * np.sqrt(self._rng.uniform()), self._rng.uniform(0.0, 2 * np.pi)
+        if self._time >= self._next_push:
+            self._next_push = self._time + self._rng.exponential(self._push_interval)
+            size, angle = self._push_speed * np.sqrt(self._rng.uniform()), self._rng.uniform(0.0, 2 * np.pi)
             env.push([size * np.cos(angle), size * np.sin(angle), 0.0])
         if self._time >= self._next_task:
             self._next_task = self._time + self._draw_time(self._task_interval)
@@ -106,7 +106,7 @@ class PerturbationWrapper(gymnasium.Wrapper):
         env.set_task(name)
 
     def _draw_command(self, task: Task) -> np.ndarray:
-        if self._corner_share > 0 and self._rng.uniform() < self._corner_share:
+        if self._corner_fraction > 0 and self._rng.uniform() < self._corner_fraction:
             return task.draw_corner(self._rng)
         return task.draw_command(self._rng)
 

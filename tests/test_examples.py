@@ -75,10 +75,10 @@ def test_smoke_writes_the_metrics_that_others_read(smoke):
         assert set(learners["expert"]) >= CLOSED_LOOP
         for name in ("multi_head", "pooled", "paper_literal"):
             assert set(learners[name]) >= CLOSED_LOOP | ONE_STEP
-        assert set(learners["clockless"]) >= CLOSED_LOOP and not set(learners["clockless"]) & ONE_STEP
+        assert set(learners["phase_free"]) >= CLOSED_LOOP and not set(learners["phase_free"]) & ONE_STEP
         assert learners["expert"]["survival_rate"] == 1.0
     assert metrics["seed"] == 0 and metrics["config"]["preset"] == "smoke"
-    assert {"demonstrations", "clone", "dagger", "clockless", "baselines", "evaluation"} <= set(metrics["seconds"])
+    assert {"demonstrations", "clone", "dagger", "phase_free", "baselines", "evaluation"} <= set(metrics["seconds"])
     assert metrics["versions"]["mujoco"]
 
 
@@ -87,7 +87,7 @@ def test_smoke_prints_one_table_per_gait_and_leaves_its_files(smoke):
     out, output = smoke
     assert all(task in output for task in PAPER_TASKS) and "R2" in output
     assert output.count("the same without a clock") == len(PAPER_TASKS)
-    for name in ("policy.zip", "clockless.zip", "joint_targets.png", "table.md", "config.json"):
+    for name in ("policy.zip", "phase_free.zip", "joint_targets.png", "table.md", "config.json"):
         assert (out / name).stat().st_size > 0
     assert list((out / "tensorboard").glob("events.*"))
 
@@ -100,7 +100,7 @@ def test_smoke_films_every_gait(smoke):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["policy.zip", "clockless.zip"])
+@pytest.mark.parametrize("name", ["policy.zip", "phase_free.zip"])
 def test_the_saved_policies_drive_their_environments(smoke, name):
     import trainers
 
@@ -112,14 +112,14 @@ def test_the_saved_policies_drive_their_environments(smoke, name):
 
 
 @pytest.mark.slow
-def test_the_clockless_student_is_the_student_with_an_estimate_of_the_phase(smoke):
+def test_the_phase_free_student_is_the_student_with_an_estimate_of_the_phase(smoke):
     import trainers
 
-    student, clockless = (trainers.load(smoke[0] / name) for name in ("policy.zip", "clockless.zip"))
-    kept, given = clockless.student.state_dict(), student.state_dict()
+    student, phase_free = (trainers.load(smoke[0] / name) for name in ("policy.zip", "phase_free.zip"))
+    kept, given = phase_free.student.state_dict(), student.state_dict()
     assert kept.keys() == given.keys() and all(bool((kept[name] == given[name]).all()) for name in given)
-    assert "phase" not in clockless.env_kwargs["channels"] and clockless.env_kwargs["history"] == 10
-    assert clockless.correction == 1.0
+    assert "phase" not in phase_free.env_kwargs["channels"] and phase_free.env_kwargs["history"] == 10
+    assert phase_free.correction == 1.0
 
 
 @pytest.mark.slow

@@ -128,7 +128,7 @@ def test_a_kick_comes_at_its_phase_and_in_its_direction(monkeypatch):
     monkeypatch.setattr(lab.env, "push", lambda delta: kicks.append((lab.env.state.phase, delta)))
     config = expert_limits.PushConfig(before_s=0.2, after_s=0.02)
     for k in range(8):
-        assert expert_limits._kick(lab, "trot", "left", 0.5, k, config, 0)
+        assert expert_limits._push_speed(lab, "trot", "left", 0.5, k, config, 0)
     pace = lab.env.control_s / TASKS["trot"].gait.period
     assert len(kicks) == 8 and all((phase - k / 8 + 1e-6) % 1.0 < pace for k, (phase, _) in enumerate(kicks))
     for _, delta in kicks:

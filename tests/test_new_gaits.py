@@ -87,7 +87,7 @@ def test_a_minute_is_ten_clean_seconds_and_fifty_disturbed_ones(base):
     assert [job.seconds for job in clean] == [2.5] * 4 and [job.seconds for job in disturbed] == [12.5] * 4
     for job in disturbed:
         assert job.perturbation.noise_rad == 0.06 and job.perturbation.command_interval == (1.5, 4.0)
-        assert job.perturbation.task_interval is None and job.env_kwargs["randomization"].share == 0.3
+        assert job.perturbation.task_interval is None and job.env_kwargs["randomization"].fraction == 0.3
     assert not any("randomization" in job.env_kwargs for job in clean)
     assert {job.task for job in jobs} == {"pace"} and all(job.env_kwargs["tasks"] == ("pace",) for job in jobs)
 
@@ -258,7 +258,7 @@ def test_policies_without_heads_or_with_memory_are_refused(tmp_path):
     for path in (
         tmp_path / "pooled.zip",
         tmp_path / "frames.zip",
-        trainers.policies.pretrained.FOLDER / "clockless.zip",
+        trainers.policies.pretrained.FOLDER / "phase_free.zip",
     ):
         with pytest.raises(InvalidInputError, match="head per gait"):
             gait_parts.learnable(Walker.student("base", path))

@@ -59,7 +59,7 @@ def run(tmp_path):
     (folder / "joint_targets.png").write_bytes(b"png")
     (folder / "gaits.gif").write_bytes(b"gif")
     (folder / "policy.zip").write_bytes(b"student")
-    (folder / "clockless.zip").write_bytes(b"without a clock")
+    (folder / "phase_free.zip").write_bytes(b"without a clock")
     return folder
 
 
@@ -79,7 +79,7 @@ def test_a_run_becomes_the_page_and_the_blocks(run, root):
     ]  # fmt: skip
     assert (results / "gaits.gif").read_bytes() == b"gif"
     students = {path.name: path.read_bytes() for path in (root / "trainers" / "assets").iterdir()}
-    assert students == {"clocked.zip": b"student", "clockless.zip": b"without a clock"}
+    assert students == {"clocked.zip": b"student", "phase_free.zip": b"without a clock"}
     page, readme = (path.read_text(encoding="utf-8") for path in (results / "README.md", root / "README.md"))
     for text in (page, readme):
         assert "| trot | multi-head student | 0.001200 | 0.0120 | 0.9877 | 19/20 | 20/20 | 0.031 | 2.50 |" in text
@@ -184,7 +184,7 @@ def test_check_writes_nothing(root, capsys):
     assert (root / "README.md").read_text(encoding="utf-8") == before
 
 
-@pytest.mark.parametrize("name", ["metrics.json", "joint_targets.png", "gaits.gif", "policy.zip", "clockless.zip"])
+@pytest.mark.parametrize("name", ["metrics.json", "joint_targets.png", "gaits.gif", "policy.zip", "phase_free.zip"])
 def test_a_missing_file_is_named(run, root, name, capsys):
     (run / name).unlink()
     assert publish.main([str(run)], root) == 2

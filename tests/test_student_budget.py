@@ -38,7 +38,7 @@ def pooled(succeeded, survived=20, trials=20, error=0.1):
 
 def levels(*successes, falls=(0, 2, 5), share=0.5):
     return [
-        {"seconds": 15.0 * 2**i, "falls": falls[i], "learner_share": share, "pooled": pooled(own)}
+        {"seconds": 15.0 * 2**i, "falls": falls[i], "learner_fraction": share, "pooled": pooled(own)}
         for i, own in enumerate(successes)
     ]
 
@@ -70,7 +70,7 @@ def test_nobody_is_disturbed_but_as_said_and_budgets_are_nested():
     assert len(small) == 4 and len(large) == 16 and large[:4] == small
     assert {job.task for job in small} == set(config.job.tasks)
     for job in large:
-        assert job.perturbation.noise_rad == 0.06 and job.perturbation.corner_share == 0.25
+        assert job.perturbation.noise_rad == 0.06 and job.perturbation.corner_fraction == 0.25
         assert job.perturbation.task_interval is None and "randomization" not in job.env_kwargs
     clean = config.demonstrations(1, False, 60.0)
     other = config.demonstrations(0, False, 60.0)
@@ -108,9 +108,9 @@ def test_who_drove_and_fell_is_counted_and_finished_students_are_read(tmp_path):
     found = {}
     for name in ("clean BC", "DAgger", "safe DAgger"):
         found[name] = [counts for _, _, counts in lessons(name, tmp_path)]
-    assert found["clean BC"] == 3 * [{"falls": 0, "learner_share": 0.0}]
-    assert [counts["learner_share"] for counts in found["DAgger"]] == [0.0, 0.5, 0.75]
-    assert found["safe DAgger"][-1]["learner_share"] < 0.75
+    assert found["clean BC"] == 3 * [{"falls": 0, "learner_fraction": 0.0}]
+    assert [counts["learner_fraction"] for counts in found["DAgger"]] == [0.0, 0.5, 0.75]
+    assert found["safe DAgger"][-1]["learner_fraction"] < 0.75
     falls = [counts["falls"] for counts in found["DAgger"]]
     assert falls == sorted(falls)
     kept = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*") if path.is_file()}

@@ -33,7 +33,7 @@ def commanded_report():
             "trot": {"drawn": figures(94, 100, 0.03), "corners": figures(20, 20)},
             "walk": {"drawn": figures(0, 100, None), "corners": figures(0, 20, None)},
         },
-        "seed 1 without a clock": {"trot": {"clockless": figures(7, 20), "clock with correction": figures(19, 20)}},
+        "seed 1 without a clock": {"trot": {"phase_free": figures(7, 20), "clock with correction": figures(19, 20)}},
         "expert": {
             "trot": {"drawn": figures(100, 100, 0.02), "corners": figures(20, 20)},
             "walk": {"drawn": figures(100, 100, 0.02), "corners": figures(19, 20)},

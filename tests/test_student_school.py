@@ -40,8 +40,8 @@ TINY = {
     "batch_size": 32,
     "clone_steps": 20,
     "round_steps": 10,
-    "clockless_s": 0.5,
-    "clockless_steps": 5,
+    "phase_free_s": 0.5,
+    "phase_free_steps": 5,
     "round_episodes": 1,
     "episode_s": 0.5,
 }
@@ -57,7 +57,7 @@ def test_a_lesson_is_named_by_what_makes_the_student():
     )
     for unused in ({"n_envs": 7}, {"device": "cuda"}, {"episodes": 1}, {"preset": "smoke"}, {"video_s": 9.0}):
         assert student_school.lesson_name(JobConfig(seed=3, **unused)) == name
-    used = ({"seed": 4}, {"width": 64}, {"kp": 20.0}, {"rounds": 2}, {"clockless_s": 0.0}, {"takeover_rad": 0.1})
+    used = ({"seed": 4}, {"width": 64}, {"kp": 20.0}, {"rounds": 2}, {"phase_free_s": 0.0}, {"takeover_rad": 0.1})
     names = {student_school.lesson_name(JobConfig(**({"seed": 3} | own))) for own in used}
     assert len(names | {name}) == 7
 
@@ -78,15 +78,17 @@ def test_a_lesson_leaves_the_main_jobs_student(lesson, tmp_path):
     job = dagger.Job(dataclasses.replace(config, n_envs=1), tmp_path / "job")
     train, held_out = job.demonstrations()
     policy = job.student(train, held_out)
-    clockless = job.clockless(policy)["clockless"]
+    phase_free = job.phase_free(policy)["phase_free"]
     np.testing.assert_allclose(
         trainers.load(student.policy).predict(held_out.obs, deterministic=True)[0],
         policy.predict(held_out.obs, deterministic=True)[0],
         atol=1e-6,
     )
-    obs = np.zeros(clockless.observation_space.shape, dtype=np.float32)
+    obs = np.zeros(phase_free.observation_space.shape, dtype=np.float32)
     obs[-2] = 1.0
-    found, expected = (own.predict(obs, deterministic=True)[0] for own in (trainers.load(student.clockless), clockless))
+    found, expected = (
+        own.predict(obs, deterministic=True)[0] for own in (trainers.load(student.phase_free), phase_free)
+    )
     np.testing.assert_allclose(found, expected, atol=1e-6)
     assert student.held_out["walk"]["r2"] == pytest.approx(trainers.offline_metrics(policy, held_out)["walk"]["r2"])
 
@@ -102,7 +104,7 @@ def test_a_lesson_is_not_given_twice(lesson, monkeypatch, capfd):
 
 def test_an_interrupted_lesson_goes_on(lesson, tmp_path, monkeypatch):
     config, _, _ = lesson
-    config = dataclasses.replace(config, rounds=0, clockless_s=0.0)
+    config = dataclasses.replace(config, rounds=0, phase_free_s=0.0)
     student = dagger.Job.student
 
     def interrupted(*_):
@@ -115,7 +117,7 @@ def test_an_interrupted_lesson_goes_on(lesson, tmp_path, monkeypatch):
     assert len(shards) == 6
     monkeypatch.setattr(dagger.Job, "student", student)
     taught = student_school.teach(config, tmp_path)
-    assert taught.policy.is_file() and taught.clockless is None
+    assert taught.policy.is_file() and taught.phase_free is None
     assert shards == {path: path.stat().st_mtime_ns for path in shards}
 
 
@@ -159,12 +161,12 @@ def test_students_without_a_clock_and_the_expert_are_measured_in_less(lesson):
     assert [(part.walker.name, part.what) for part in parts] == [
         ("seed 2", "drawn"),
         ("seed 2", "corners"),
-        ("seed 2 without a clock", "clockless"),
+        ("seed 2 without a clock", "phase_free"),
         ("seed 2 without a clock", "clock with correction"),
         ("expert", "drawn"),
         ("expert", "corners"),
     ]
-    assert isinstance(who[1].load(), trainers.ClocklessPolicy) and who[2].env_kwargs["kp"] == 50.0
+    assert isinstance(who[1].load(), trainers.PhaseFreePolicy) and who[2].env_kwargs["kp"] == 50.0
     alone = student_classes.variant_walkers({"kp 20": student})
     assert alone == [Walker.student("kp 20", student.policy)] and alone[0].sha256 == who[0].sha256
 
@@ -174,7 +176,7 @@ def test_students_without_a_clock_and_the_expert_are_measured_in_less(lesson):
 
 @pytest.fixture
 def calls(monkeypatch):
-    """Arguments of `trainers.evaluate` and `trainers.evaluate_switch`, which measure nothing."""
+    """Arguments of `trainers.evaluate` and `trainers.evaluate_transition`, which measure nothing."""
     found = []
 
     def evaluate(*arguments, **kwargs):
@@ -182,7 +184,7 @@ def calls(monkeypatch):
         record = trainers.EpisodeRecord(0, ((0.0, 0.0, 0.0),), 1.0, False, 0.1, 0.0, (0.0, 0.0, 0.0, 0.0), True)
         return trainers.ClosedLoopResult("trot", 1.0, (record,))
 
-    for name in ("evaluate", "evaluate_switch"):
+    for name in ("evaluate", "evaluate_transition"):
         monkeypatch.setattr(trainers, name, evaluate)
     return found
 
@@ -235,7 +237,7 @@ def test_a_quick_run_makes_its_students_once(tmp_path, monkeypatch):
     assert list(commanded["report"]) == ["seed 1", "seed 1 without a clock", "expert"]
     own = commanded["report"]["seed 1"]["walk"]["drawn"]
     assert own["trials"] == 2 and set(own["passed"]) == set(commanded["bars"]) == set(student_classes.BARS)
-    assert set(commanded["report"]["seed 1 without a clock"]["walk"]) == {"clockless", "clock with correction"}
+    assert set(commanded["report"]["seed 1 without a clock"]["walk"]) == {"phase_free", "clock with correction"}
     assert commanded["report"]["expert"]["trot"]["corners"]["survived"] == 1
     assert commanded["seconds"]["students"] > 0.0 and len(commanded["policies"]) == 2
     assert list(ablation["report"]) == list(ablation["lessons"]) == ["default, reduced", "no round"]

@@ -95,11 +95,11 @@ def test_the_environment_accepts_every_value(quantity):
 def test_changes_of_gait_are_passed_on(monkeypatch):
     calls = []
 
-    def evaluate_switch(who, first, second, trials=20, seed=1, **kwargs):
+    def evaluate_transition(who, first, second, trials=20, seed=1, **kwargs):
         calls.append((first, second, trials, seed, kwargs))
         return result([False] * 18 + [True] * 2, [True] * 15 + [False] * 5)
 
-    monkeypatch.setattr(trainers, "evaluate_switch", evaluate_switch, raising=False)
+    monkeypatch.setattr(trainers, "evaluate_transition", evaluate_transition, raising=False)
     section = student_parts.SECTIONS["switching"]
     assert section.config.parts("walk", ("trot", "walk", "jump")) == ("trot", "jump")
     found = section.measure(Idle(), "walk", "trot", section.config, 3, kd=1.0)

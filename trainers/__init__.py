@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from trainers.data.environments import PerturbationConfig, make_env, make_venv
     from trainers.evaluation.closed_loop import evaluate
     from trainers.evaluation.figures import joint_target_figure
-    from trainers.evaluation.gait_transitions import evaluate_switch
+    from trainers.evaluation.gait_transitions import evaluate_transition
     from trainers.evaluation.metrics import offline_metrics
     from trainers.evaluation.scoring import ClosedLoopResult, EpisodeRecord
     from trainers.evaluation.video import record_frames, save_gif, tile
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from trainers.policies.expert_policy import ExpertPolicy
     from trainers.policies.multi_head import MultiHeadPolicy
     from trainers.policies.phase_estimator import PhaseConfig, PhaseEstimator, phase_errors, train_phase
-    from trainers.policies.phase_free import ClocklessPolicy, learn_without_clock
+    from trainers.policies.phase_free import PhaseFreePolicy, train_phase_free
     from trainers.policies.pretrained import load_pretrained
     from trainers.policies.stateful import Learner
     from trainers.utils.logging import log_figure, log_round, log_text, make_logger
@@ -39,7 +39,7 @@ _HOME = {
     "BCTrainer": "algorithms.bc",
     "BlockCollector": "algorithms.dagger_collector",
     "CheckpointError": "policies.checkpoint",
-    "ClocklessPolicy": "policies.phase_free",
+    "PhaseFreePolicy": "policies.phase_free",
     "ClosedLoopResult": "evaluation.scoring",
     "CollectJob": "data.collection",
     "DAggerConfig": "algorithms.dagger",
@@ -59,10 +59,10 @@ _HOME = {
     "collect": "data.collection",
     "collect_all": "data.collection",
     "evaluate": "evaluation.closed_loop",
-    "evaluate_switch": "evaluation.gait_transitions",
+    "evaluate_transition": "evaluation.gait_transitions",
     "joint_target_figure": "evaluation.figures",
     "learn_task": "algorithms.add_task",
-    "learn_without_clock": "policies.phase_free",
+    "train_phase_free": "policies.phase_free",
     "load": "policies.checkpoint",
     "load_pretrained": "policies.pretrained",
     "log_figure": "utils.logging",
@@ -89,7 +89,7 @@ __all__ = [
     "BCTrainer",
     "BlockCollector",
     "CheckpointError",
-    "ClocklessPolicy",
+    "PhaseFreePolicy",
     "ClosedLoopResult",
     "CollectJob",
     "DAggerConfig",
@@ -109,10 +109,10 @@ __all__ = [
     "collect",
     "collect_all",
     "evaluate",
-    "evaluate_switch",
+    "evaluate_transition",
     "joint_target_figure",
     "learn_task",
-    "learn_without_clock",
+    "train_phase_free",
     "load",
     "load_pretrained",
     "log_figure",

@@ -56,8 +56,8 @@ def pair_matrix(ax: Axes, data: Mapping[str, Mapping[str, Any]], counted: str) -
             pair = data[source].get(target)
             if pair and pair["trials"]:
                 share[i, j] = pair[counted] / pair["trials"]
-                text, colour = f"{pair[counted]}/{pair['trials']}", "white" if share[i, j] > 0.6 else "black"
-                ax.text(j, i, text, ha="center", va="center", fontsize=9, color=colour)
+                text, color = f"{pair[counted]}/{pair['trials']}", "white" if share[i, j] > 0.6 else "black"
+                ax.text(j, i, text, ha="center", va="center", fontsize=9, color=color)
     image = ax.imshow(np.ma.masked_invalid(share), cmap="Blues", vmin=0.0, vmax=1.0)
     ax.set_facecolor("0.93")
     ax.set_xticks(range(len(gaits)), gaits)
@@ -115,7 +115,7 @@ def limit_figure(data: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> Figure:
 
 
 def contact_figure(data: Mapping[str, Mapping[str, Any]]) -> Figure:
-    """Feet on the ground over two cycles: planned in grey, measured in colour."""
+    """Feet on the ground over two cycles: planned in grey, measured in color."""
     known = {gait: own["cruise"]["schedule"] for gait, own in data.items() if "schedule" in own["cruise"]}
     columns = 2 if len(known) > 1 else 1
     rows = -(-len(known) // columns)

@@ -158,10 +158,10 @@ def largest_push(lab: Lab, task: str, direction: str, config: PushConfig, seed: 
 
 
 def _withstands(lab: Lab, task: str, direction: str, size: float, config: PushConfig, seed: int) -> bool:
-    return all(_kick(lab, task, direction, size, k, config, seed) for k in range(config.phases))
+    return all(_push_speed(lab, task, direction, size, k, config, seed) for k in range(config.phases))
 
 
-def _kick(lab: Lab, task: str, direction: str, size: float, k: int, config: PushConfig, seed: int) -> bool:
+def _push_speed(lab: Lab, task: str, direction: str, size: float, k: int, config: PushConfig, seed: int) -> bool:
     """Whether one kick, as the gait clock passes phase k / phases, is survived."""
     lab.begin(task, CRUISE, direction, seed, k)
     if not lab.walk(config.before_s):

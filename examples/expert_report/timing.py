@@ -19,7 +19,7 @@ from go1_mtl_gym.sensing.state import RobotState
 MODES = {
     "default": NMPCConfig(),
     "one QP per call": NMPCConfig(sqp_iterations=1),
-    "real-time iterations": NMPCConfig(sqp_iterations=1, linearisation="shifted"),
+    "real-time iterations": NMPCConfig(sqp_iterations=1, linearization="shifted"),
     "converged SQP": NMPCConfig(sqp_iterations=20, sqp_tolerance=1e-3),
 } | {f"whole body: {name}": NMPCConfig(whole_body=name) for name in WHOLE_BODY if name != NMPCConfig().whole_body}
 """Settings of the expert that are compared with each other, by name."""

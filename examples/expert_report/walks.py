@@ -50,7 +50,7 @@ class SoakConfig:
         command_s: time between new commands [s].
         switch_s: mean time between changes of gait [s].
         kick_s: mean time between kicks [s].
-        kick: largest change of the base's velocity [m/s].
+        push: largest change of the base's velocity [m/s].
         tasks: the gaits that are changed to.
     """
 
@@ -58,7 +58,7 @@ class SoakConfig:
     command_s: float = 2.0
     switch_s: float = 5.0
     kick_s: float = 3.0
-    kick: float = 0.5
+    push: float = 0.5
     tasks: tuple[str, ...] = tuple(TASKS)
 
 
@@ -103,7 +103,7 @@ def soak(lab: Lab, task: str, config: SoakConfig, seed: int) -> dict[str, Any]:
             lab.env.set_task(str(rng.choice(config.tasks)))
             switches += 1
         if rng.uniform() * config.kick_s * hz < 1:
-            size, angle = config.kick * np.sqrt(rng.uniform()), rng.uniform(0, 2 * np.pi)
+            size, angle = config.push * np.sqrt(rng.uniform()), rng.uniform(0, 2 * np.pi)
             lab.env.push((size * np.cos(angle), size * np.sin(angle), 0.0))
             kicks += 1
         fallen = lab.step()["fallen"]

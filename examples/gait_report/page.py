@@ -13,7 +13,7 @@ from gait_report.methods import BEFORE, METHODS
 from trainers.evaluation.metrics import wilson_interval
 from trainers.utils.report import markdown, number
 
-COLOURS = dict(zip(METHODS, ("#2166ac", "#7570b3", "#1b9e77", "#d6604d"), strict=True))
+COLORS = dict(zip(METHODS, ("#2166ac", "#7570b3", "#1b9e77", "#d6604d"), strict=True))
 """Of the methods."""
 NOTE = (
     "Success (survival) and R2 on held-out rows by seconds of demonstrations, all training seeds together; the "
@@ -126,17 +126,17 @@ def new_gaits_figure(data: Mapping[str, Any]) -> Figure:
 
 
 def _draw(shares: Axes, errors: Axes, method: str, levels: Sequence[Mapping[str, Any]]) -> None:
-    sums, colour = [level_sums(level) for level in levels], COLOURS[method]
+    sums, color = [level_sums(level) for level in levels], COLORS[method]
     seconds = [own["seconds"] for own in sums]
     bounds = np.transpose([own["survival_interval"] for own in sums])
-    shares.fill_between(seconds, *bounds, color=colour, alpha=0.12, linewidth=0)
+    shares.fill_between(seconds, *bounds, color=color, alpha=0.12, linewidth=0)
     survival = [own["survival_rate"] for own in sums]
-    shares.plot(seconds, survival, color=colour, linewidth=2.0, marker="o", markersize=3.5, label=method)
-    shares.plot(seconds, [own["success_rate"] for own in sums], color=colour, linewidth=1.2, linestyle="--")
-    errors.plot(seconds, [1 - own["r2"] for own in sums], color=colour, linewidth=2.0)
+    shares.plot(seconds, survival, color=color, linewidth=2.0, marker="o", markersize=3.5, label=method)
+    shares.plot(seconds, [own["success_rate"] for own in sums], color=color, linewidth=1.2, linestyle="--")
+    errors.plot(seconds, [1 - own["r2"] for own in sums], color=color, linewidth=2.0)
     for level in levels:
         missing = [1 - own["r2"] for own in level["seeds"].values()]
-        errors.plot([level["seconds"]] * len(missing), missing, "o", color=colour, markersize=3.5, alpha=0.6)
+        errors.plot([level["seconds"]] * len(missing), missing, "o", color=color, markersize=3.5, alpha=0.6)
 
 
 def new_gaits_section(data: Mapping[str, Any], made_by: str, picture: bool) -> list[str]:

@@ -35,7 +35,7 @@ class JobConfig:
         randomized: share of the disturbed episodes whose physics and sensor noise are drawn, by the ranges of
             `go1_mtl_gym.DomainRandomization`.
         task_interval: shortest and longest time between changes of gait in disturbed episodes, or None.
-        corner_share: probability with which a new command in them is a corner of its range.
+        corner_fraction: probability with which a new command in them is a corner of its range.
         shard_s: length of a shard, which begins with a standing start.
         dagger_s: recorded in each DAgger round.
         takeover_rad: of the DAgger rounds, see `trainers.DAggerConfig`.
@@ -43,9 +43,9 @@ class JobConfig:
         normalization: of inputs and outputs, see `trainers.MultiHeadPolicy`.
         batch_size: rows per gradient step.
         clone_steps, round_steps: gradient steps of cloning and of each round.
-        clockless_s: the student's walks that the clockless student learns the phase from, per gait; 0 makes none.
-        clockless_history: frames of proprioception that it reads.
-        clockless_steps: gradient steps of its phase estimator.
+        phase_free_s: the student's walks that the phase_free student learns the phase from, per gait; 0 makes none.
+        phase_free_history: frames of proprioception that it reads.
+        phase_free_steps: gradient steps of its phase estimator.
         episodes, episode_s, command_interval: of the closed-loop evaluation, per task and learner; a new command comes
             every so many seconds.
         round_episodes: episodes per task after each DAgger round.
@@ -72,7 +72,7 @@ class JobConfig:
     held_out_s: float = 60.0
     randomized: float = 0.3
     task_interval: tuple[float, float] | None = (2.0, 6.0)
-    corner_share: float = 0.25
+    corner_fraction: float = 0.25
     shard_s: float = 15.0
     dagger_s: float = 60.0
     takeover_rad: float | None = None
@@ -81,9 +81,9 @@ class JobConfig:
     batch_size: int = 1024
     clone_steps: int = 6000
     round_steps: int = 2500
-    clockless_s: float = 240.0
-    clockless_history: int = 10
-    clockless_steps: int = 4000
+    phase_free_s: float = 240.0
+    phase_free_history: int = 10
+    phase_free_steps: int = 4000
     episodes: int = 20
     episode_s: float = 30.0
     command_interval: float = 5.0
@@ -114,14 +114,14 @@ class JobConfig:
     @property
     def world(self) -> dict[str, Any]:
         """What is different about environments in which disturbed episodes and rounds take place."""
-        return {"randomization": DomainRandomization(share=self.randomized)} if self.randomized else {}
+        return {"randomization": DomainRandomization(fraction=self.randomized)} if self.randomized else {}
 
     def disturbed(self, noise_rad: float) -> PerturbationConfig:
         """How a disturbed episode is disturbed, with action noise of at most `noise_rad`."""
         several = len(self.tasks) > 1
         return PerturbationConfig(
             noise_rad=noise_rad,
-            corner_share=self.corner_share,
+            corner_fraction=self.corner_fraction,
             task_interval=self.task_interval if several else None,
         )
 
@@ -165,8 +165,8 @@ PRESETS: dict[str, dict[str, Any]] = {
         "batch_size": 256,
         "clone_steps": 300,
         "round_steps": 100,
-        "clockless_s": 2.0,
-        "clockless_steps": 100,
+        "phase_free_s": 2.0,
+        "phase_free_steps": 100,
         "episodes": 2,
         "episode_s": 5.0,
         "round_episodes": 1,
@@ -181,7 +181,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "perturbed_s": 0.0,
         "randomized": 0.0,
         "task_interval": None,
-        "clockless_s": 0.0,
+        "phase_free_s": 0.0,
         "held_out_s": 60.0,
         "shard_s": 30.0,
         "width": 2560,

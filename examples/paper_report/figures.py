@@ -14,7 +14,7 @@ from go1_mtl_gym import robot
 from go1_mtl_gym.sensing.observation import ObservationLayout
 from paper_report.published import KINDS, MULTI_HEAD, POOLED
 
-COLOURS = {MULTI_HEAD: "#2166ac", POOLED: "#d6604d"}
+COLORS = {MULTI_HEAD: "#2166ac", POOLED: "#d6604d"}
 STYLES = ("-", "--", ":", "-.")
 """Of the widths, the widest first."""
 
@@ -26,7 +26,7 @@ def loss_figure(students: Sequence[Mapping[str, Any]], gaits: Sequence[str]) -> 
         students: what is known of them; other kinds are not drawn.
         gaits: of the table.
     """
-    drawn = [own for own in students if own["kind"] in COLOURS]
+    drawn = [own for own in students if own["kind"] in COLORS]
     widths = sorted({own["width"] for own in drawn}, reverse=True)
     figure = new_figure(3.3 * len(gaits) + 0.4, 3.2)
     axes = figure.subplots(1, len(gaits), squeeze=False, sharey=True)[0]
@@ -34,7 +34,7 @@ def loss_figure(students: Sequence[Mapping[str, Any]], gaits: Sequence[str]) -> 
         for own in drawn:
             style = STYLES[min(widths.index(own["width"]), len(STYLES) - 1)]
             label = f"{KINDS[own['kind']]}, {own['width']} wide"
-            ax.plot(own["curve"]["steps"], own["curve"]["mse"][gait], style, color=COLOURS[own["kind"]], label=label)
+            ax.plot(own["curve"]["steps"], own["curve"]["mse"][gait], style, color=COLORS[own["kind"]], label=label)
         ax.set_yscale("log")
         ax.xaxis.set_major_locator(MaxNLocator(4))
         ax.set_title(gait, fontsize=10)

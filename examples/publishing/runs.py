@@ -12,7 +12,7 @@ from trainers.utils.report import results_table
 
 COPIED = ("joint_targets.png", "gaits.gif")
 """Files of a run that are published as they are, next to ``metrics.json``."""
-STUDENTS = {"policy.zip": "clocked.zip", "clockless.zip": "clockless.zip"}
+STUDENTS = {"policy.zip": "clocked.zip", "phase_free.zip": "phase_free.zip"}
 """Policies of a run, and their names in ``trainers/assets/``, from where `trainers.load_pretrained` reads them."""
 PUBLISHED_PRESET = "default"
 FOLDERS = ("--out", "--out-dir", "--parts")

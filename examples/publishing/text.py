@@ -28,7 +28,7 @@ SETTINGS = {
     "batch_size": "rows per gradient step",
     "clone_steps": "gradient steps of cloning",
     "round_steps": "gradient steps per round",
-    "clockless_s": "the student's walks that tell it the phase, per gait [s]",
+    "phase_free_s": "the student's walks that tell it the phase, per gait [s]",
     "episodes": "evaluation episodes per gait and learner",
     "episode_s": "duration of an episode [s]",
 }

@@ -124,7 +124,7 @@ def budget(name: str, _task: str, what: str, config: BudgetConfig, seed: int, fo
         folder: of demonstrations and students.
 
     Returns:
-        "levels", one per budget: "seconds" of labels per gait, "falls" while collecting them, "learner_share" of the
+        "levels", one per budget: "seconds" of labels per gait, "falls" while collecting them, "learner_fraction" of the
         steps while collecting them that the learner drove, `student_lab.summary` "pooled" and per gait in "tasks"; and
         "drops" of the success, see `drops`.
     """
@@ -151,7 +151,7 @@ def budget(name: str, _task: str, what: str, config: BudgetConfig, seed: int, fo
 class Lessons:
     """The students of one method and seed, budget by budget, each taught from the same initial weights.
 
-    Iterating gives (seconds of labels per gait, the student, {"falls", "learner_share"} while collecting them). A
+    Iterating gives (seconds of labels per gait, the student, {"falls", "learner_fraction"} while collecting them). A
     student may be taught anew when the next one is asked for.
 
     Attributes:
@@ -188,7 +188,7 @@ class Lessons:
             return policy
 
         policy = kept_policy(self._own / f"cloned-{seconds:g}.zip", teach)
-        return seconds, policy, {"falls": falls, "learner_share": 0.0}
+        return seconds, policy, {"falls": falls, "learner_fraction": 0.0}
 
     def _rounds(self) -> Iterator[tuple[float, Any, dict[str, float]]]:
         config, method = self.config, self.method
@@ -207,8 +207,8 @@ class Lessons:
                 policy.fit_normalization(trainer.rows.obs, trainer.rows.acts)
                 trainer.train_round()
                 falls += found.meta["falls"]
-                by_learner += found.meta["learner_share"] * seconds / 2
-                yield seconds, policy, {"falls": falls, "learner_share": by_learner / seconds}
+                by_learner += found.meta["learner_fraction"] * seconds / 2
+                yield seconds, policy, {"falls": falls, "learner_fraction": by_learner / seconds}
 
     @property
     def _job(self) -> JobConfig:

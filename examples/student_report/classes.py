@@ -7,7 +7,7 @@ from typing import Any
 
 from main_job.config import PRESETS, JobConfig
 
-from student_report.commanded import CLOCKLESS, CORNERS, CORRECTED, DRAWN
+from student_report.commanded import CORNERS, CORRECTED, DRAWN, PHASE_FREE
 from student_report.lab import EXPERT, Walker, walkers
 from student_report.school import UNUSED, Student
 
@@ -43,7 +43,7 @@ def changed(config: JobConfig) -> dict[str, Any]:
 
 BARS = {"success_rate": 0.95, "velocity_error": 0.05, "error_ratio": 2.0}
 """Smallest success rate, largest velocity error [m/s], and largest ratio of it to the expert's."""
-WITHOUT_CLOCK = " without a clock"
+PHASE_FREE_VARIANTS = " without a clock"
 """Appended to a student's name."""
 
 
@@ -55,13 +55,13 @@ def seed_lessons(seeds: Sequence[int], quick: bool) -> dict[str, JobConfig]:
 def seed_walkers(students: Mapping[str, Student]) -> list[Walker]:
     """Every student, the same without a clock, and the expert."""
     *clocked, expert = walkers([f"{name}={student.policy}" for name, student in students.items()])
-    clockless = [
-        Walker.student(name + WITHOUT_CLOCK, student.clockless, only=(CLOCKLESS, CORRECTED))
+    phase_free = [
+        Walker.student(name + PHASE_FREE_VARIANTS, student.phase_free, only=(PHASE_FREE, CORRECTED))
         for name, student in students.items()
-        if student.clockless
+        if student.phase_free
     ]
     expected = [dataclasses.replace(walker, only=(DRAWN, CORNERS)) for walker in (*clocked, expert)]
-    return [*expected[:-1], *clockless, expected[-1]]
+    return [*expected[:-1], *phase_free, expected[-1]]
 
 
 def judged(found: Found, students: Mapping[str, Student]) -> Found:
@@ -94,7 +94,7 @@ REDUCED = {
     "dagger_s": 60.0,
     "clone_steps": 3000,
     "round_steps": 1500,
-    "clockless_s": 0.0,
+    "phase_free_s": 0.0,
     "round_episodes": 1,
     "episode_s": 10.0,
 }
@@ -126,7 +126,7 @@ QUICK_VARIANTS = (DEFAULT, "without phase", "no round")
 
 def variant_lessons(seeds: Sequence[int], quick: bool) -> dict[str, JobConfig]:
     """The reduced job and its variants, for the first training seed."""
-    base = PRESETS["smoke"] | {"clockless_s": 0.0} if quick else REDUCED
+    base = PRESETS["smoke"] | {"phase_free_s": 0.0} if quick else REDUCED
     names = QUICK_VARIANTS if quick else VARIANTS
     return {name: JobConfig(**(base | VARIANTS[name]), seed=seeds[0]) for name in names}
 

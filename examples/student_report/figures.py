@@ -11,13 +11,13 @@ from matplotlib.figure import Figure
 from student_report.classes import BARS
 from student_report.commanded import DRAWN
 from student_report.lab import EXPERT
-from student_report.lessons_page import budget_figure, clockless_figure
+from student_report.lessons_page import budget_figure, phase_free_figure
 from student_report.pushes import PAIRS
 from student_report.robustness import QUANTITIES
 from student_report.sums import Count, Report, commanded_sums, gaits_of, seeds_of, variant_sums
 from trainers.evaluation.metrics import wilson_interval
 
-COLOURS = ("#2166ac", "#1b9e77", "#7570b3", "#e6ab02")
+COLORS = ("#2166ac", "#1b9e77", "#7570b3", "#e6ab02")
 """Of the students, in turn."""
 EXPERT_STYLE = {"color": "0.35", "linestyle": "--"}
 BAR = 0.95
@@ -27,7 +27,7 @@ BAR = 0.95
 def styles(report: Report) -> Iterator[tuple[str, dict[str, Any]]]:
     """Every walker and the style of its lines: students solid, the expert dashed."""
     for i, name in enumerate(report):
-        yield name, EXPERT_STYLE if name == EXPERT else {"color": COLOURS[i % len(COLOURS)], "linestyle": "-"}
+        yield name, EXPERT_STYLE if name == EXPERT else {"color": COLORS[i % len(COLORS)], "linestyle": "-"}
 
 
 def commanded_figure(report: Report) -> Figure:
@@ -38,10 +38,10 @@ def commanded_figure(report: Report) -> Figure:
     for i, gait in enumerate(gaits):
         sums, seeds = commanded_sums(report, gait), seeds_of(report, gait, DRAWN).values()
         places = i - 0.15 + np.linspace(-0.1, 0.1, len(seeds))
-        left.plot(places, [own["success_rate"] for own in seeds], "o", color=COLOURS[0], alpha=0.6, label="each seed")
+        left.plot(places, [own["success_rate"] for own in seeds], "o", color=COLORS[0], alpha=0.6, label="each seed")
         _interval(left, i + 0.15, sums[DRAWN], label="all, 95 %")
         errors = [np.nan if own["velocity_error"] is None else own["velocity_error"] for own in seeds]
-        right.plot(places, errors, "o", color=COLOURS[0], alpha=0.6)
+        right.plot(places, errors, "o", color=COLORS[0], alpha=0.6)
         if sums["expert_error"] is not None:
             right.plot(i + 0.15, sums["expert_error"], "D", color=EXPERT_STYLE["color"], label=EXPERT)
     for ax, key, label in ((left, "success_rate", "success"), (right, "velocity_error", "velocity error [m/s]")):
@@ -77,7 +77,7 @@ def ablation_figure(report: Report) -> Figure:
     axes = figure.subplots(1, len(columns), sharey=True)
     for ax, (key, label) in zip(axes, columns.items()):
         values = [_share(own[key]) for own in sums.values()]
-        ax.plot(values, range(len(values)), "o", color=COLOURS[0])
+        ax.plot(values, range(len(values)), "o", color=COLORS[0])
         ax.axvline(values[0], color="0.6", linewidth=0.8, linestyle=":", zorder=0)
         ax.set_xlabel(label, fontsize=9)
         ax.tick_params(labelsize=8)
@@ -154,8 +154,8 @@ def push_figure(report: Report) -> Figure:
         for i, (name, style) in enumerate(styles(report)):
             kicks = {task: weaker(parts, pair) for task, parts in report[name].items()}
             places = np.arange(len(kicks)) + (i - (len(report) - 1) / 2) * width
-            colour = "0.7" if name == EXPERT else style["color"]
-            bars = ax.bar(places, [kick or 0.0 for kick in kicks.values()], 0.92 * width, color=colour, label=name)
+            color = "0.7" if name == EXPERT else style["color"]
+            bars = ax.bar(places, [kick or 0.0 for kick in kicks.values()], 0.92 * width, color=color, label=name)
             ax.bar_label(
                 bars, ["" if kick is None else f"{kick:.1f}" for kick in kicks.values()], fontsize=8, padding=1
             )
@@ -179,6 +179,6 @@ FIGURES: dict[str, Callable[[Report], Figure]] = {
     "pushes": push_figure,
     "ablation": ablation_figure,
     "budget": budget_figure,
-    "clockless": clockless_figure,
+    "phase_free": phase_free_figure,
 }
 """Section -> what draws it."""

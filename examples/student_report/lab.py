@@ -10,14 +10,14 @@ import trainers
 from go1_mtl_gym import TASKS
 from go1_mtl_gym.conditions import EXPERTS_ALONE
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.sim.physics_params import Realism
+from go1_mtl_gym.sim.physics_params import PhysicsParams
 from trainers.evaluation.metrics import wilson_interval
 
 EXPERT = "expert"
 SHARED = ("tasks", "control_hz", "kp", "kd")
 """Arguments of the students' environments that the expert's has as well; the others shape what only students see."""
 
-WORLD = ("randomization", "noise", *EXPERTS_ALONE, *(each.name for each in fields(Realism)))
+WORLD = ("randomization", "noise", *EXPERTS_ALONE, *(each.name for each in fields(PhysicsParams)))
 """Arguments in which the environment that a student was trained in may differ; here all walk in the model's world."""
 
 

@@ -13,10 +13,10 @@ from student_report.sums import Report, mean
 from trainers.evaluation.metrics import wilson_interval
 from trainers.utils.report import markdown, number
 
-COLOURS = ("#d6604d", "#e6ab02", "#7570b3", "#1b9e77", "#2166ac")
+COLORS = ("#d6604d", "#e6ab02", "#7570b3", "#1b9e77", "#2166ac")
 """Of the methods of "budget", in turn."""
 MEASURED = {"walking": ("#2166ac", "o"), "noisy": ("#e6ab02", "s"), "switching": ("#1b9e77", "^")}
-"""What is drawn of "clockless": colour and marker."""
+"""What is drawn of "phase_free": color and marker."""
 PHASE_FLOOR = 1e-3
 """Smaller errors of the phase are drawn as this [cycles]."""
 
@@ -32,13 +32,13 @@ def pooled_levels(seeds: Mapping[str, Any]) -> list[dict[str, Any]]:
 
     Returns:
         "seconds"; "succeeded", "survived" and "trials" with "success_rate", "success_interval" and "survival_rate";
-        and the means over seeds of "velocity_error" [m/s], "falls" and "learner_share".
+        and the means over seeds of "velocity_error" [m/s], "falls" and "learner_fraction".
     """
     found = []
     for levels in zip(*(part["levels"] for part in seeds.values()), strict=True):
         own = [level["pooled"] for level in levels]
         count = {name: sum(each[name] for each in own) for name in ("succeeded", "survived", "trials")}
-        means = {name: float(np.mean([level[name] for level in levels])) for name in ("falls", "learner_share")}
+        means = {name: float(np.mean([level[name] for level in levels])) for name in ("falls", "learner_fraction")}
         found.append(
             {
                 "seconds": levels[0]["seconds"],
@@ -61,7 +61,7 @@ def budget_table(report: Report) -> str:
     for name, levels in methods.items():
         last = levels[-1]
         cells = [f"{level['success_rate']:.0%} ({level['survival_rate']:.0%})" for level in levels]
-        counts = [f"{last['falls']:.1f}", f"{last['learner_share']:.0%}"]
+        counts = [f"{last['falls']:.1f}", f"{last['learner_fraction']:.0%}"]
         fell = ", ".join(budgets[i] for i in drops(levels)) or "none"
         rows.append([name, *cells, number(last["velocity_error"], ".3f"), *counts, fell])
     more = ["velocity error [m/s]", "falls while collecting", "driven by the learner", "drops at"]
@@ -69,19 +69,19 @@ def budget_table(report: Report) -> str:
 
 
 def budget_figure(report: Report) -> Figure:
-    """Survival (solid) and success (dashed) over labels, and falls while collecting them, one colour per method."""
+    """Survival (solid) and success (dashed) over labels, and falls while collecting them, one color per method."""
     figure = new_figure(9.6, 3.6)
     shares, falls = figure.subplots(1, 2)
-    for colour, (name, tasks) in zip(COLOURS, report.items()):
+    for color, (name, tasks) in zip(COLORS, report.items()):
         levels = pooled_levels(tasks[ALL])
         seconds = [level["seconds"] for level in levels]
         survival = [level["survival_rate"] for level in levels]
         bounds = np.transpose([wilson_interval(level["survived"], level["trials"]) for level in levels])
-        shares.fill_between(seconds, *bounds, color=colour, alpha=0.12, linewidth=0)
-        shares.plot(seconds, survival, color=colour, linewidth=2.0, marker="o", markersize=3.5, label=name)
-        shares.plot(seconds, [level["success_rate"] for level in levels], color=colour, linewidth=1.2, linestyle="--")
+        shares.fill_between(seconds, *bounds, color=color, alpha=0.12, linewidth=0)
+        shares.plot(seconds, survival, color=color, linewidth=2.0, marker="o", markersize=3.5, label=name)
+        shares.plot(seconds, [level["success_rate"] for level in levels], color=color, linewidth=1.2, linestyle="--")
         fallen = [level["falls"] for level in levels]
-        falls.plot(seconds, fallen, color=colour, linewidth=2.0, marker="o", markersize=3.5)
+        falls.plot(seconds, fallen, color=color, linewidth=2.0, marker="o", markersize=3.5)
     for ax in (shares, falls):
         ax.set_xscale("log")
         ax.set_xticks(seconds, [f"{value:g}" for value in seconds])
@@ -98,7 +98,7 @@ def budget_figure(report: Report) -> Figure:
 # -- Without a clock ---------------------------------------------------------------------------------------------------
 
 
-def clockless_rows(report: Report) -> dict[str, Mapping[str, Any]]:
+def phase_free_rows(report: Report) -> dict[str, Mapping[str, Any]]:
     """{name of the student, and its part if it has several: figures}."""
     return {
         name if len(tasks[ALL]) == 1 else f"{name}, {what}": figures
@@ -107,9 +107,9 @@ def clockless_rows(report: Report) -> dict[str, Mapping[str, Any]]:
     }
 
 
-def clockless_table(report: Report) -> str:
+def phase_free_table(report: Report) -> str:
     """Per student: success in every gait, what all gaits have in common, and the error of the phase."""
-    named = clockless_rows(report)
+    named = phase_free_rows(report)
     gaits = list(next(iter(named.values()))["tasks"])
     rows = []
     for name, found in named.items():
@@ -123,19 +123,19 @@ def clockless_table(report: Report) -> str:
     return markdown(["", *gaits, *more], rows)
 
 
-def clockless_figure(report: Report) -> Figure:
+def phase_free_figure(report: Report) -> Figure:
     """Success while walking, with noisy sensors and in changes of gait; the phase error from median to 99 %."""
-    named = clockless_rows(report)
+    named = phase_free_rows(report)
     places = np.arange(len(named))[::-1]
     figure = new_figure(9.6, 1.2 + 0.4 * len(named))
     shares, errors = figure.subplots(1, 2, sharey=True, width_ratios=(2, 1))
-    for i, (key, (colour, marker)) in enumerate(MEASURED.items()):
+    for i, (key, (color, marker)) in enumerate(MEASURED.items()):
         shown = [(place, found[key]) for place, found in zip(places, named.values()) if found[key]]
         for place, own in shown:
-            shares.plot(own["success_interval"], [place + 0.2 * (1 - i)] * 2, color=colour, linewidth=1.0, alpha=0.6)
+            shares.plot(own["success_interval"], [place + 0.2 * (1 - i)] * 2, color=color, linewidth=1.0, alpha=0.6)
         rates = [own["success_rate"] for _, own in shown]
         heights = [place + 0.2 * (1 - i) for place, _ in shown]
-        shares.plot(rates, heights, marker, color=colour, markersize=5, linestyle="", label=key)
+        shares.plot(rates, heights, marker, color=color, markersize=5, linestyle="", label=key)
     for place, found in zip(places, named.values()):
         if found["phase"] is not None:
             both = [max(PHASE_FLOOR, found["phase"][name]) for name in ("median", "p99")]

@@ -6,10 +6,10 @@ from typing import Any
 
 from student_report.ablation import CHANGED_WORLD
 from student_report.classes import BARS, passes
-from student_report.commanded import CLOCKLESS, CORNERS, CORRECTED, DRAWN
+from student_report.commanded import CORNERS, CORRECTED, DRAWN, PHASE_FREE
 from student_report.figures import BAR
 from student_report.lab import EXPERT
-from student_report.lessons_page import budget_table, clockless_table
+from student_report.lessons_page import budget_table, phase_free_table
 from student_report.robustness import QUANTITIES
 from student_report.sums import Count, Report, commanded_sums, gaits_of, variant_sums
 from trainers.evaluation.metrics import wilson_interval
@@ -74,7 +74,7 @@ def commanded_table(report: Report) -> str:
             worst = _judged(own["worst"], "success_rate", ".0%")
             success = [_count(own[DRAWN], BARS["success_rate"]), f"{low:.1%} ... {high:.1%}", worst, *errors]
             tracked[1] = _judged(own["worst_ratio"], "error_ratio", ".2f")
-        others = (_count(own[what]) for what in (CORNERS, "expert_corners", CLOCKLESS, CORRECTED))
+        others = (_count(own[what]) for what in (CORNERS, "expert_corners", PHASE_FREE, CORRECTED))
         rows.append([gait, *success, *tracked, *others])
     header = ["gait", "success", "95 % interval", "worst seed", "velocity error [m/s]", "worst seed's", "expert's"]
     return markdown([*header, "worst ratio", "corners", "expert's", "without a clock", "own clock"], rows)
@@ -124,7 +124,7 @@ def push_table(report: Report) -> str:
     for gait in gaits_of(report):
         for name, tasks in report.items():
             parts = tasks.get(gait, {})
-            rows.append([gait, name, *(_kick(parts[part]) if part in parts else "-" for part in names)])
+            rows.append([gait, name, *(_push_speed(parts[part]) if part in parts else "-" for part in names)])
     return markdown(["gait", "", *(f"{name} [m/s]" for name in names)], rows, text_columns=2)
 
 
@@ -154,7 +154,7 @@ def _against_bar(level: Mapping[str, Any]) -> str:
     return ", ".join(_count((level[key], level["trials"]), BAR) for key in ("survived", "succeeded"))
 
 
-def _kick(found: Mapping[str, Any]) -> str:
+def _push_speed(found: Mapping[str, Any]) -> str:
     return f"{'>= ' if found['at_cap'] else ''}{found['largest']:.1f}"
 
 
@@ -209,14 +209,14 @@ CHAPTERS = {
         "Survival, success and falls over labels, of five ways to ask for them",
         budget_table,
     ),
-    "clockless": Chapter(
+    "phase_free": Chapter(
         "Without a clock",
         "Successful episodes with commands that change, in every gait; survivors, changes of gait and noisy sensors "
         "of all gaits together; median and 99th percentile of the error of the phase on disturbed walks of the expert "
         "that nobody learned from. Students with a correction in their name were given; the others learned from the "
         "same demonstrations.",
         "Success and error of the phase, of students without a clock",
-        clockless_table,
+        phase_free_table,
     ),
 }
 """Sections in the order of the page."""

@@ -12,20 +12,20 @@ import experts
 import go1_mtl_gym
 import trainers
 from student_report import budget as student_budget
-from student_report import clockless as student_clockless
+from student_report import phase_free as student_phase_free
 from student_report.ablation import AblationConfig, ablation
 from student_report.budget import BudgetConfig, budget
 from student_report.classes import ABLATION, COMMANDED, SchoolClass
-from student_report.clockless import ClocklessConfig, clockless
 from student_report.commanded import CommandedConfig, commanded
 from student_report.lab import Walker
+from student_report.phase_free import PhaseFreeConfig, phase_free
 from student_report.pushes import KickConfig, pushes
 from student_report.robustness import RobustnessConfig, robustness
 from student_report.switching import SwitchingConfig, switching
 from trainers.evaluation.closed_loop import controller
 from trainers.policies.checkpoint import versions
 
-SCORING = (trainers.evaluate, trainers.evaluate_switch, trainers.ClosedLoopResult, controller)
+SCORING = (trainers.evaluate, trainers.evaluate_transition, trainers.ClosedLoopResult, controller)
 """What stands in the files of `trainers` that a figure depends on."""
 
 
@@ -59,7 +59,7 @@ SECTIONS = {
     "pushes": Section(pushes, KickConfig(), KickConfig(2, grid=2, before_s=0.5, after_s=0.5)),
     "ablation": Section(ablation, AblationConfig(), AblationConfig(2, 1, 4.0, 2.0, QUICK_SWITCHING), school=ABLATION),
     "budget": Section(budget, BudgetConfig(), student_budget.QUICK, prepare=student_budget.prepare),
-    "clockless": Section(clockless, ClocklessConfig(), student_clockless.QUICK, prepare=student_clockless.prepare),
+    "phase_free": Section(phase_free, PhaseFreeConfig(), student_phase_free.QUICK, prepare=student_phase_free.prepare),
 }
 """Every section by name."""
 

@@ -70,7 +70,7 @@ def asked_phase(policy: trainers.MultiHeadPolicy) -> Estimate:
     return estimate
 
 
-def running_phase(policy: trainers.ClocklessPolicy) -> Estimate:
+def running_phase(policy: trainers.PhaseFreePolicy) -> Estimate:
     """The clock that a student keeps while it follows the rows of each episode."""
 
     def estimate(rows: trainers.Demonstrations, have: ObservationLayout) -> np.ndarray:
@@ -97,9 +97,9 @@ def phase_error(estimate: Estimate, rows: trainers.Demonstrations, layout: Obser
     return {"median": float(np.median(error)), "p99": float(np.quantile(error, 0.99))}
 
 
-def with_correction(policy: trainers.ClocklessPolicy, correction: float) -> trainers.ClocklessPolicy:
+def with_correction(policy: trainers.PhaseFreePolicy, correction: float) -> trainers.PhaseFreePolicy:
     """The same student and estimator in the same world, with another correction of the clock."""
-    other = trainers.ClocklessPolicy(policy.student, policy.estimator, correction)
+    other = trainers.PhaseFreePolicy(policy.student, policy.estimator, correction)
     other.env_kwargs = policy.env_kwargs
     other.set_training_mode(False)
     return other

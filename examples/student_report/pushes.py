@@ -56,7 +56,7 @@ def pushes(who: Any, task: str, direction: str, config: KickConfig, seed: int, *
     try:
         for k in range(1, config.grid + 1):
             size = round(k * config.step, 6)
-            survived = sum(_kick(env, who, task, direction, size, config, seed, i) for i in range(config.trials))
+            survived = sum(_push_speed(env, who, task, direction, size, config, seed, i) for i in range(config.trials))
             sizes.append({"size": size, "survived": survived, "trials": config.trials})
             if survived < config.share * config.trials - 1e-9:
                 break
@@ -66,11 +66,11 @@ def pushes(who: Any, task: str, direction: str, config: KickConfig, seed: int, *
     return {"largest": largest, "at_cap": largest == sizes[-1]["size"], "sizes": sizes}
 
 
-def _kick(
+def _push_speed(
     env: Any, who: Any, task: str, direction: str, size: float, config: KickConfig, seed: int, trial: int
 ) -> bool:
     """Whether one kick is survived; trial i is the same walk for every size."""
-    keys = ("kick", task, direction, seed, trial)
+    keys = ("push", task, direction, seed, trial)
     base, act = env.unwrapped, controller(who, env.unwrapped)
     before_s = config.before_s + generator(*keys).uniform() * TASKS[task].gait.period
     obs, _ = env.reset(seed=derive_seed(*keys), options={"task": task, "command": CRUISE})

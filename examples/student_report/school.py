@@ -28,14 +28,14 @@ class Student:
     Attributes:
         folder: of the lesson, as the main job's ``--out``.
         policy: file of the student.
-        clockless: file of the same without a clock; None if the settings ask for none.
+        phase_free: file of the same without a clock; None if the settings ask for none.
         held_out: gait -> one-step errors on the held-out rows, as `trainers.offline_metrics` gives them.
         seconds: that the lesson took [s].
     """
 
     folder: Path
     policy: Path
-    clockless: Path | None
+    phase_free: Path | None
     held_out: dict[str, dict[str, float]]
     seconds: float
 
@@ -60,9 +60,9 @@ def teach(config: JobConfig, root: Path) -> Student:
         folder.mkdir(parents=True, exist_ok=True)
         with open(folder / "progress.log", "a", encoding="utf-8") as log, _alone(log):
             write_json(done, _lesson(config, folder))
-    clockless = folder / "clockless.zip"
+    phase_free = folder / "phase_free.zip"
     found = json.loads(done.read_text(encoding="utf-8"))
-    return Student(folder, folder / "policy.zip", clockless if clockless.is_file() else None, **found)
+    return Student(folder, folder / "policy.zip", phase_free if phase_free.is_file() else None, **found)
 
 
 def teach_all(lessons: Mapping[str, JobConfig], root: Path, n_jobs: int) -> dict[str, Student]:
@@ -96,7 +96,7 @@ def _lesson(config: JobConfig, folder: Path) -> dict[str, Any]:
     job = Job(dataclasses.replace(config, **defaults | {"n_envs": 1}), folder)
     train, held_out = job.demonstrations()
     student = job.student(train, held_out)
-    job.clockless(student)
+    job.phase_free(student)
     return {"held_out": trainers.offline_metrics(student, held_out), "seconds": round(sum(job.seconds.values()), 1)}
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from student_report.ablation import CHANGED
-from student_report.commanded import CLOCKLESS, CORNERS, CORRECTED, DRAWN
+from student_report.commanded import CORNERS, CORRECTED, DRAWN, PHASE_FREE
 from student_report.lab import EXPERT
 
 Report = Mapping[str, Mapping[str, Mapping[str, Any]]]
@@ -41,7 +41,7 @@ def commanded_sums(report: Report, gait: str) -> dict[str, Any]:
     """Of all training seeds together, in one gait.
 
     Returns:
-        "drawn", "corners", "clockless" and "clock with correction": see `pooled`; "expert_corners": likewise; "worst":
+        "drawn", "corners", "phase_free" and "clock with correction": see `pooled`; "expert_corners": likewise; "worst":
         smallest success rate of a seed; "error", "worst_error", "expert_error": mean and largest velocity error of a
         seed and the expert's [m/s]; "worst_ratio": largest of the seeds'. None for what was not measured, or for what
         there is none of because a student kept falling.
@@ -49,7 +49,7 @@ def commanded_sums(report: Report, gait: str) -> dict[str, Any]:
     drawn = list(seeds_of(report, gait, DRAWN).values())
     expert = report.get(EXPERT, {}).get(gait, {})
     return {
-        **{what: pooled(seeds_of(report, gait, what).values()) for what in (DRAWN, CORNERS, CLOCKLESS, CORRECTED)},
+        **{what: pooled(seeds_of(report, gait, what).values()) for what in (DRAWN, CORNERS, PHASE_FREE, CORRECTED)},
         "expert_corners": pooled([expert[CORNERS]] if CORNERS in expert else []),
         "worst": min((own["success_rate"] for own in drawn), default=None),
         "error": mean(own["velocity_error"] for own in drawn),

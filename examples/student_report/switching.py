@@ -29,4 +29,4 @@ class SwitchingConfig:
 def switching(who: Any, first: str, second: str, config: SwitchingConfig, seed: int, **env_kwargs: Any) -> dict:
     """From the first gait to the second: see `student_lab.summary`."""
     spans = {"before_s": config.before_s, "after_s": config.after_s}
-    return summary(trainers.evaluate_switch(who, first, second, config.trials, seed, **spans, **env_kwargs))
+    return summary(trainers.evaluate_transition(who, first, second, config.trials, seed, **spans, **env_kwargs))

@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.sim.physics_params import Realism
+from go1_mtl_gym.sim.physics_params import PhysicsParams
 from go1_mtl_gym.validation import finite_vector, number_in
 
 Range = tuple[float, float] | None
@@ -17,9 +17,9 @@ class DomainRandomization:
 
     Attributes:
         friction, payload_kg, action_delay_s, motor_strength, joint_friction, rotor_inertia, contact_time_s: as in
-            `go1_mtl_gym.sim.physics_params.Realism`.
+            `go1_mtl_gym.sim.physics_params.PhysicsParams`.
         noise: factor on the environment's `SensorNoise`, or on the default one if the environment has none.
-        share: of the episodes that are randomised; the others are as without randomization.
+        fraction: of the episodes that are randomised; the others are as without randomization.
 
     Raises:
         InvalidInputError: if a range is not low <= high, or one of its ends is an impossible figure.
@@ -33,10 +33,10 @@ class DomainRandomization:
     rotor_inertia: Range = (0.0, 0.01)
     contact_time_s: Range = (0.005, 0.04)
     noise: Range = (0.0, 1.5)
-    share: float = 1.0
+    fraction: float = 1.0
 
     def __post_init__(self) -> None:
-        number_in(self.share, 0.0, 1.0, "share of randomised episodes")
+        number_in(self.fraction, 0.0, 1.0, "fraction of randomised episodes")
         for name, (low, high) in self._ranges().items():
             if low > high:
                 raise InvalidInputError(f"range of {name} must be low <= high, got {(low, high)}")
@@ -45,9 +45,9 @@ class DomainRandomization:
                 if name == "noise":
                     number_in(end, 0.0, 10.0, "factor on the sensor noise")
                 else:
-                    Realism(**{name: end})
+                    PhysicsParams(**{name: end})
 
-    def draw(self, rng: np.random.Generator, base: Realism) -> tuple[Realism, float | None]:
+    def draw(self, rng: np.random.Generator, base: PhysicsParams) -> tuple[PhysicsParams, float | None]:
         """Draw the figures of an episode; every call takes as many numbers from the generator.
 
         Args:
@@ -58,7 +58,7 @@ class DomainRandomization:
             The physics, and the factor on the sensor noise; None leaves the noise as it is.
         """
         chance, *levels = rng.uniform(size=len(fields(self))).tolist()
-        if chance >= self.share:
+        if chance >= self.fraction:
             return base, None
         level = dict(zip((each.name for each in fields(self)), levels))
         drawn = {
@@ -70,7 +70,7 @@ class DomainRandomization:
 
     def _ranges(self) -> dict[str, tuple[float, float]]:
         """The ranges that are not None, by name."""
-        given = {each.name: getattr(self, each.name) for each in fields(self) if each.name != "share"}
+        given = {each.name: getattr(self, each.name) for each in fields(self) if each.name != "fraction"}
         return {
             name: tuple(finite_vector(ends, 2, f"range of {name}").tolist())
             for name, ends in given.items()

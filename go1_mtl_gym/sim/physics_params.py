@@ -23,7 +23,7 @@ CHANGED_ARRAYS = (
     "actuator_biasprm",
     "actuator_forcerange",
 )
-"""The arrays of a model that `Realism.apply` writes to."""
+"""The arrays of a model that `PhysicsParams.apply` writes to."""
 _NONE = -1.0
 _ALLOWED = {
     "friction": (0.05, 2.0, ""),
@@ -37,7 +37,7 @@ _ALLOWED = {
 
 
 @dataclass(frozen=True)
-class Realism:
+class PhysicsParams:
     """What is different about the physics; the defaults change nothing. The expert is told none of it.
 
     Attributes:
@@ -77,7 +77,7 @@ class Realism:
         return np.array([_NONE if value is None else value for value in astuple(self)], dtype=np.float64)
 
     @classmethod
-    def from_vector(cls, vector: Sequence[float]) -> "Realism":
+    def from_vector(cls, vector: Sequence[float]) -> "PhysicsParams":
         """The inverse of `as_vector`."""
         return cls(*(None if value == _NONE else float(value) for value in vector))
 

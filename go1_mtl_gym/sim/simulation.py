@@ -7,7 +7,7 @@ import numpy as np
 
 from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PHYSICS_HZ, PDGains
-from go1_mtl_gym.sim.physics_params import CHANGED_ARRAYS, INERTIAL_ARRAYS, ActionDelay, Realism
+from go1_mtl_gym.sim.physics_params import CHANGED_ARRAYS, INERTIAL_ARRAYS, ActionDelay, PhysicsParams
 
 CONTACT_FORCE = 2.0
 """A foot counts as on the ground when it presses with more than this [N]."""
@@ -29,16 +29,16 @@ class Simulation:
 
     Args:
         gains: of the PD actuators.
-        realism: what is different about the physics.
+        physics_params: what is different about the physics.
 
     Attributes:
         model: the MuJoCo model; private to this simulation, so it may be changed (friction, masses). Copies of an
-            environment begin with the unchanged model, and `set_realism` overwrites what it is about.
+            environment begin with the unchanged model, and `set_physics_params` overwrites what it is about.
         data: the MuJoCo data.
-        realism: what is different about the physics now.
+        physics_params: what is different about the physics now.
     """
 
-    def __init__(self, gains: PDGains, realism: Realism | None = None) -> None:
+    def __init__(self, gains: PDGains, physics_params: PhysicsParams | None = None) -> None:
         self.model = mujoco.MjModel.from_xml_path(robot.SCENE_PATH)
         self.data = mujoco.MjData(self.model)
         self.model.opt.timestep = 1.0 / PHYSICS_HZ
@@ -46,7 +46,7 @@ class Simulation:
         self.model.actuator_biasprm[:, 1] = -gains.kp
         self.model.actuator_biasprm[:, 2] = -gains.kd
         self._plain = {name: getattr(self.model, name).copy() for name in CHANGED_ARRAYS}
-        self.set_realism(realism or Realism())
+        self.set_physics_params(physics_params or PhysicsParams())
         self._sensor = {
             name: slice(start, start + size)
             for name, start, size in (
@@ -73,21 +73,21 @@ class Simulation:
         self.data.qpos[2] -= self.feet_w[:, 2].min() - robot.FOOT_RADIUS
         mujoco.mj_forward(self.model, self.data)
 
-    def set_realism(self, realism: Realism) -> None:
+    def set_physics_params(self, physics_params: PhysicsParams) -> None:
         """Let something else be different about the physics, from the next step on.
 
-        The figures are those of the model on disk, changed by `realism` alone. Targets on their way are forgotten: the
-        actuators go on holding what they hold.
+        The figures are those of the model on disk, changed by `physics_params` alone. Targets on their way are
+        forgotten: the actuators go on holding what they hold.
         """
         before = [getattr(self.model, name).copy() for name in INERTIAL_ARRAYS]
         for name, value in self._plain.items():
             getattr(self.model, name)[:] = value
-        realism.apply(self.model)
+        physics_params.apply(self.model)
         if not all(np.array_equal(getattr(self.model, name), old) for name, old in zip(INERTIAL_ARRAYS, before)):
             mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
-        self._delay = ActionDelay(realism.delay_steps)
+        self._delay = ActionDelay(physics_params.delay_steps)
         self._delay.reset(self.data.ctrl)
-        self.realism = realism
+        self.physics_params = physics_params
 
     def step(self, target: np.ndarray, physics_steps: int) -> None:
         """Command joint targets [rad], shape (12,), for a number of 1 ms steps; the delay decides when they are held.
@@ -146,17 +146,19 @@ class Simulation:
         )
 
     def snapshot(self) -> np.ndarray:
-        """Everything needed to continue to the bit, as one vector: state, targets on their way, realism."""
+        """Everything needed to continue to the bit, as one vector: state, targets on their way, physics_params."""
         state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
         mujoco.mj_getState(self.model, self.data, state, _STATE)
-        return np.concatenate([state, self._delay.waiting.ravel(), self.realism.as_vector()])
+        return np.concatenate([state, self._delay.waiting.ravel(), self.physics_params.as_vector()])
 
     def restore(self, snapshot: np.ndarray) -> None:
-        """Return to a snapshot of a simulation with the same gains; its realism comes with it."""
+        """Return to a snapshot of a simulation with the same gains; its physics_params comes with it."""
         size = mujoco.mj_stateSize(self.model, _STATE)
-        state, waiting, realism = np.split(snapshot, [size, len(snapshot) - len(self.realism.as_vector())])
-        if Realism.from_vector(realism) != self.realism:
-            self.set_realism(Realism.from_vector(realism))
+        state, waiting, physics_params = np.split(
+            snapshot, [size, len(snapshot) - len(self.physics_params.as_vector())]
+        )
+        if PhysicsParams.from_vector(physics_params) != self.physics_params:
+            self.set_physics_params(PhysicsParams.from_vector(physics_params))
         mujoco.mj_setState(self.model, self.data, state, _STATE)
         mujoco.mj_forward(self.model, self.data)
         mujoco.mj_setState(self.model, self.data, state, _STATE)

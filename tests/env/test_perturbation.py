@@ -1,4 +1,4 @@
-"""Noise, kicks and changing commands, and labels that stay clean under them."""
+"""Noise, pushes and changing commands, and labels that stay clean under them."""
 
 import dataclasses
 
@@ -11,7 +11,7 @@ from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.wrappers import NOISE_CORRELATION_S
 
-QUIET = {"noise_rad": 0.0, "kick": 0.0, "command_interval": None}
+QUIET = {"noise_rad": 0.0, "push": 0.0, "command_interval": None}
 
 
 def wrapped(**kwargs) -> PerturbationWrapper:
@@ -34,7 +34,7 @@ def test_without_disturbances_it_is_the_environment():
 def test_one_seed_gives_the_same_disturbances_and_another_others():
     runs = []
     for seed in (1, 1, 2):
-        env = PerturbationWrapper(Go1Env("trot"), kick_interval=0.1, command_interval=(0.1, 0.3))
+        env = PerturbationWrapper(Go1Env("trot"), push_interval=0.1, command_interval=(0.1, 0.3))
         env.reset(seed=seed, options={"command": (0.1, 0, 0)})
         steps = [env.step(home(env)) for _ in range(60)]
         runs.append([np.concatenate([step[0], step[4]["executed_action"], step[4]["command"]]) for step in steps])
@@ -61,7 +61,7 @@ def test_noise_is_autoregressive_with_a_sigma_drawn_per_episode():
     assert np.mean(lags) == pytest.approx(np.exp(-0.02 / NOISE_CORRELATION_S), abs=0.03)
 
 
-def kicks(env: PerturbationWrapper, steps: int, monkeypatch) -> np.ndarray:
+def pushes(env: PerturbationWrapper, steps: int, monkeypatch) -> np.ndarray:
     """Every velocity passed to `push` in a run, shape (n, 3)."""
     pushes: list[np.ndarray] = []
     monkeypatch.setattr(env.unwrapped, "push", lambda delta: pushes.append(np.array(delta)))
@@ -72,9 +72,9 @@ def kicks(env: PerturbationWrapper, steps: int, monkeypatch) -> np.ndarray:
 
 
 def test_kicks_are_uniform_in_a_disc_and_come_at_the_mean_interval(monkeypatch):
-    env = wrapped(kick=0.2, kick_interval=0.5)
+    env = wrapped(push=0.2, push_interval=0.5)
     env.reset(seed=0)
-    pushed = kicks(env, 10_000, monkeypatch)  # 200 s
+    pushed = pushes(env, 10_000, monkeypatch)  # 200 s
     assert len(pushed) == pytest.approx(200 / 0.51, rel=0.2)  # each interval is rounded up to a step of .02 s
     size = np.linalg.norm(pushed[:, :2], axis=1)
     assert size.max() <= 0.2 and not pushed[:, 2].any()
@@ -83,7 +83,7 @@ def test_kicks_are_uniform_in_a_disc_and_come_at_the_mean_interval(monkeypatch):
 
 
 def test_a_kick_changes_the_velocity_of_the_trunk_by_at_most_its_size():
-    env = wrapped(kick=0.3, kick_interval=0.05)
+    env = wrapped(push=0.3, push_interval=0.05)
     env.reset(seed=0)
     data, changes = env.unwrapped.simulation.data, []
     push = env.unwrapped.simulation.push
@@ -134,7 +134,7 @@ def commands(env: PerturbationWrapper, steps: int, monkeypatch) -> np.ndarray:
 
 
 def test_a_share_of_the_commands_are_corners(monkeypatch):
-    env = wrapped(command_interval=(0.02, 0.02), corner_share=0.3)
+    env = wrapped(command_interval=(0.02, 0.02), corner_fraction=0.3)
     levels = commands(env, 1400, monkeypatch) / np.array(TASKS["trot"].command_range)
     corners = (np.abs(levels) == 1.0).all(axis=1)
     assert corners.mean() == pytest.approx(0.3, abs=0.05)
@@ -143,7 +143,7 @@ def test_a_share_of_the_commands_are_corners(monkeypatch):
 
 
 def test_every_command_can_be_a_corner(monkeypatch):
-    levels = commands(wrapped(command_interval=(0.02, 0.02), corner_share=1.0), 50, monkeypatch)
+    levels = commands(wrapped(command_interval=(0.02, 0.02), corner_fraction=1.0), 50, monkeypatch)
     assert (np.abs(levels) == TASKS["trot"].command_range).all()
 
 
@@ -207,7 +207,7 @@ def test_without_corners_and_changes_of_task_the_stream_of_draws_is_this():
     env = wrapped(command_interval=(0.1, 0.2))
     env.reset(seed=4)
     rng = np.random.default_rng([4, 0x9E3779B9])
-    rng.uniform(), rng.standard_normal(12), rng.exponential()  # size of the noise, its beginning, the first kick
+    rng.uniform(), rng.standard_normal(12), rng.exponential()  # size of the noise, its beginning, the first push
     steps = int(np.ceil(rng.uniform(0.1, 0.2) / 0.02))
     for _ in range(steps):
         rng.standard_normal(12)
@@ -217,7 +217,7 @@ def test_without_corners_and_changes_of_task_the_stream_of_draws_is_this():
 
 
 def test_the_expert_survives_changes_of_task_and_corners():
-    env = PerturbationWrapper(Go1Env(None), task_interval=(0.3, 0.8), command_interval=(0.3, 0.8), corner_share=0.5)
+    env = PerturbationWrapper(Go1Env(None), task_interval=(0.3, 0.8), command_interval=(0.3, 0.8), corner_fraction=0.5)
     _, info = env.reset(seed=0)
     seen = {info["task"]}
     for _ in range(200):
@@ -233,7 +233,7 @@ def test_one_task_cannot_change():
 
 
 def test_labels_are_the_experts_answer_for_the_true_state():
-    env = PerturbationWrapper(Go1Env("trot"), noise_rad=0.06, kick=0.2, kick_interval=0.1)
+    env = PerturbationWrapper(Go1Env("trot"), noise_rad=0.06, push=0.2, push_interval=0.1)
     env.reset(seed=5)
     for _ in range(8):
         expert = NMPCExpert(env.unwrapped.gains)
@@ -256,13 +256,13 @@ def test_executed_actions_stay_in_the_action_space():
     ("figures", "words"),
     [
         ({"noise_rad": -0.1}, r"noise_rad.*\[0, 1\].*-0.1"),
-        ({"kick": float("nan")}, "kick.*nan"),
-        ({"kick_interval": 0.0}, "kick_interval.*got 0"),
+        ({"push": float("nan")}, "push.*nan"),
+        ({"push_interval": 0.0}, "push_interval.*got 0"),
         ({"command_interval": (2.0, 1.0)}, "command_interval.*shortest"),
         ({"command_interval": (0.0, 1.0)}, "command_interval"),
         ({"command_interval": (1.0,)}, r"command_interval.*shape \(2,\)"),
         ({"command_interval": (1.0, float("inf"))}, "command_interval.*finite"),
-        ({"corner_share": 1.5}, r"corner_share must lie in \[0, 1\], got 1.5"),
+        ({"corner_fraction": 1.5}, r"corner_fraction must lie in \[0, 1\], got 1.5"),
         ({"task_interval": (2.0, 1.0)}, "task_interval must be 0 < shortest <= longest, got"),
         ({"task_interval": (-1.0, 1.0)}, "task_interval"),
     ],

@@ -13,15 +13,15 @@ from go1_mtl_gym import DomainRandomization, SensorNoise, robot
 from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.sim.domain_randomization import Range
-from go1_mtl_gym.sim.physics_params import Realism
+from go1_mtl_gym.sim.physics_params import PhysicsParams
 
 RANGES = [each.name for each in dataclasses.fields(DomainRandomization) if each.type == Range]
 NOTHING = DomainRandomization(**dict.fromkeys(RANGES))
 
 
-def draws(randomization: DomainRandomization, number: int, base: Realism | None = None) -> list:
+def draws(randomization: DomainRandomization, number: int, base: PhysicsParams | None = None) -> list:
     rng = np.random.default_rng(0)
-    return [randomization.draw(rng, base or Realism()) for _ in range(number)]
+    return [randomization.draw(rng, base or PhysicsParams()) for _ in range(number)]
 
 
 # -- Draws -------------------------------------------------------------------------------------------------------------
@@ -29,8 +29,8 @@ def draws(randomization: DomainRandomization, number: int, base: Realism | None 
 
 def test_draws_fill_their_ranges_evenly_and_independently():
     default = DomainRandomization()
-    assert len(RANGES) == len(dataclasses.fields(Realism)) + 1
-    rows = np.array([[*dataclasses.astuple(realism), factor] for realism, factor in draws(default, 2000)])
+    assert len(RANGES) == len(dataclasses.fields(PhysicsParams)) + 1
+    rows = np.array([[*dataclasses.astuple(physics_params), factor] for physics_params, factor in draws(default, 2000)])
     low, high = np.array([getattr(default, name) for name in RANGES]).T
     level = (rows - low) / (high - low)
     assert (level >= 0).all() and (level <= 1).all()
@@ -40,30 +40,30 @@ def test_draws_fill_their_ranges_evenly_and_independently():
 
 
 def test_a_range_of_none_leaves_the_base_and_the_other_draws():
-    base = Realism(friction=0.3, payload_kg=1.0)
+    base = PhysicsParams(friction=0.3, payload_kg=1.0)
     all_drawn, some = draws(DomainRandomization(), 20), draws(DomainRandomization(friction=None, noise=None), 20, base)
-    for (realism, _), (other, factor) in zip(all_drawn, some):
-        assert other == dataclasses.replace(realism, friction=0.3) and factor is None
+    for (physics_params, _), (other, factor) in zip(all_drawn, some):
+        assert other == dataclasses.replace(physics_params, friction=0.3) and factor is None
     assert draws(NOTHING, 5, base) == [(base, None)] * 5
 
 
 def test_a_share_of_the_episodes_is_randomised():
-    base = Realism(contact_time_s=0.03)
-    mixed, every = draws(DomainRandomization(share=0.3), 2000, base), draws(DomainRandomization(), 2000, base)
+    base = PhysicsParams(contact_time_s=0.03)
+    mixed, every = draws(DomainRandomization(fraction=0.3), 2000, base), draws(DomainRandomization(), 2000, base)
     drawn = [one for one in mixed if one != (base, None)]
     assert len(drawn) / 2000 == pytest.approx(0.3, abs=4 * np.sqrt(0.3 * 0.7 / 2000))
     assert all(one in ((base, None), other) for one, other in zip(mixed, every)), "the others are as without a share"
-    assert draws(DomainRandomization(share=0.0), 50, base) == [(base, None)] * 50
+    assert draws(DomainRandomization(fraction=0.0), 50, base) == [(base, None)] * 50
 
 
 def test_a_range_of_one_point_gives_it():
     ranges = {"friction": (0.7, 0.7), "motor_strength": (1.5, 1.5), "noise": (0.0, 0.0)}
-    for realism, factor in draws(dataclasses.replace(NOTHING, **ranges), 20):
-        assert realism == Realism(friction=0.7, motor_strength=1.5) and factor == 0.0
+    for physics_params, factor in draws(dataclasses.replace(NOTHING, **ranges), 20):
+        assert physics_params == PhysicsParams(friction=0.7, motor_strength=1.5) and factor == 0.0
 
 
 def test_it_survives_json():
-    own = DomainRandomization(friction=[0.5, 1], payload_kg=None, share=0.5)
+    own = DomainRandomization(friction=[0.5, 1], payload_kg=None, fraction=0.5)
     again = DomainRandomization(**json.loads(json.dumps(dataclasses.asdict(own))))
     assert again == own and hash(again) == hash(own) and own.friction == (0.5, 1.0)
 
@@ -79,7 +79,7 @@ def test_it_survives_json():
         ({"rotor_inertia": (0.0, float("nan"))}, "range of rotor_inertia must be finite"),
         ({"contact_time_s": ("soft", "stiff")}, "range of contact_time_s must be 2 numbers.*soft"),
         ({"noise": (-1.0, 1.0)}, "factor on the sensor noise.*got -1"),
-        ({"share": 1.5}, r"share of randomised episodes must lie in \[0, 1\], got 1.5"),
+        ({"fraction": 1.5}, r"fraction of randomised episodes must lie in \[0, 1\], got 1.5"),
     ],
 )
 def test_impossible_ranges_are_refused(arguments, words):
@@ -92,31 +92,34 @@ def test_impossible_ranges_are_refused(arguments, words):
 
 def test_every_reset_draws_and_a_seed_repeats_it():
     env, twin = Go1Env("trot", randomization=True), Go1Env("trot", randomization=True)
-    assert env.realism == Realism()
+    assert env.physics_params == PhysicsParams()
     seen = []
     for seed in (0, None, None, 1, None):
         one, other = env.reset(seed=seed)[0], twin.reset(seed=seed)[0]
         np.testing.assert_array_equal(one, other)
         for action in np.random.default_rng(0).uniform(-0.2, 0.2, (5, 12)):
             np.testing.assert_array_equal(env.step(action)[0], twin.step(action)[0])
-        assert env.realism == twin.realism and env.realism not in seen
-        seen.append(env.realism)
+        assert env.physics_params == twin.physics_params and env.physics_params not in seen
+        seen.append(env.physics_params)
     env.reset(seed=0)
-    assert env.realism == seen[0]
+    assert env.physics_params == seen[0]
 
 
 def test_the_model_is_the_drawn_one():
     env = Go1Env("trot", randomization=True, kp=40.0)
     for seed in range(3):
         env.reset(seed=seed)
-        model, realism = env.simulation.model, env.realism
-        assert model.body_mass.sum() == pytest.approx(robot.MASS + realism.payload_kg)
-        assert (model.geom_friction[:, 0] == realism.friction).all()
-        np.testing.assert_allclose(model.actuator_gainprm[:, 0], 40.0 * realism.motor_strength)
-        assert (model.dof_armature[6:] == realism.rotor_inertia).all()
-        assert (model.dof_frictionloss[6:] == realism.joint_friction).all()
-        assert model.geom_solref[model.geom("FL_foot").id, 0] == realism.contact_time_s
-        assert len(env.simulation.snapshot()) == len(Go1Env("trot").simulation.snapshot()) + 12 * realism.delay_steps
+        model, physics_params = env.simulation.model, env.physics_params
+        assert model.body_mass.sum() == pytest.approx(robot.MASS + physics_params.payload_kg)
+        assert (model.geom_friction[:, 0] == physics_params.friction).all()
+        np.testing.assert_allclose(model.actuator_gainprm[:, 0], 40.0 * physics_params.motor_strength)
+        assert (model.dof_armature[6:] == physics_params.rotor_inertia).all()
+        assert (model.dof_frictionloss[6:] == physics_params.joint_friction).all()
+        assert model.geom_solref[model.geom("FL_foot").id, 0] == physics_params.contact_time_s
+        assert (
+            len(env.simulation.snapshot())
+            == len(Go1Env("trot").simulation.snapshot()) + 12 * physics_params.delay_steps
+        )
         assert env.simulation.feet_w[:, 2].min() == pytest.approx(robot.FOOT_RADIUS)
 
 
@@ -133,11 +136,11 @@ def test_command_and_pose_after_a_reset_are_those_without_randomization(kwargs):
 
 def test_a_share_of_none_is_the_environment_itself():
     own = {"friction": 0.6, "payload_kg": 1.0}
-    env, plain = Go1Env("walk", randomization=DomainRandomization(share=0.0), **own), Go1Env("walk", **own)
+    env, plain = Go1Env("walk", randomization=DomainRandomization(fraction=0.0), **own), Go1Env("walk", **own)
     np.testing.assert_array_equal(env.reset(seed=2)[0], plain.reset(seed=2)[0])
     for action in np.random.default_rng(0).uniform(-0.2, 0.2, (10, 12)):
         np.testing.assert_array_equal(env.step(action)[0], plain.step(action)[0])
-    assert env.realism == plain.realism == Realism(**own)
+    assert env.physics_params == plain.physics_params == PhysicsParams(**own)
 
 
 def test_without_randomization_a_reset_leaves_the_model_alone():
@@ -163,7 +166,7 @@ def test_the_factor_multiplies_the_environments_noise_or_the_default(noise, devi
 
 
 def test_the_noise_of_an_episode_is_forgotten_by_the_next():
-    env = Go1Env("trot", randomization=dataclasses.replace(NOTHING, noise=(1.0, 1.0), share=0.5))
+    env = Go1Env("trot", randomization=dataclasses.replace(NOTHING, noise=(1.0, 1.0), fraction=0.5))
     exact = []
     for seed in range(12):
         obs, _ = env.reset(seed=seed)
@@ -184,7 +187,7 @@ def test_another_kind_of_randomization_is_refused(randomization):
 
 # -- Copies ------------------------------------------------------------------------------------------------------------
 
-RANDOMISED = {"randomization": DomainRandomization(friction=(0.3, 0.9), share=0.8), "payload_kg": 0.5, "noise": True}
+RANDOMISED = {"randomization": DomainRandomization(friction=(0.3, 0.9), fraction=0.8), "payload_kg": 0.5, "noise": True}
 
 
 @pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
@@ -196,19 +199,19 @@ def test_a_copy_of_a_randomised_episode_continues_to_the_bit(duplicate, seed):
     for action in actions[:10]:
         env.step(action)
     twin = duplicate(env)
-    assert twin.realism == env.realism
+    assert twin.physics_params == env.physics_params
     for action in actions[10:]:
         np.testing.assert_array_equal(env.step(action)[0], twin.step(action)[0])
     np.testing.assert_array_equal(env.simulation.snapshot(), twin.simulation.snapshot())
     np.testing.assert_array_equal(env.reset()[0], twin.reset()[0])
-    assert twin.realism == env.realism
+    assert twin.physics_params == env.physics_params
 
 
 def test_it_goes_through_gymnasium_make_and_its_spec():
     env = gymnasium.make("go1_mtl_gym:Go1Trot-v0", disable_env_checker=True, rotor_inertia=0.01, **RANDOMISED)
     again = gymnasium.make(pickle.loads(pickle.dumps(env.spec)))
     np.testing.assert_array_equal(env.reset(seed=5)[0], again.reset(seed=5)[0])
-    assert env.unwrapped.realism == again.unwrapped.realism != Realism()
+    assert env.unwrapped.physics_params == again.unwrapped.physics_params != PhysicsParams()
 
 
 def test_the_expert_is_told_nothing():

@@ -8,7 +8,7 @@ from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PDGains
 from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.sim.physics_params import PAYLOAD_SIDE, ActionDelay, Realism
+from go1_mtl_gym.sim.physics_params import PAYLOAD_SIDE, ActionDelay, PhysicsParams
 from go1_mtl_gym.sim.simulation import Simulation
 
 
@@ -18,9 +18,9 @@ def fields(model: mujoco.MjModel) -> dict[str, np.ndarray]:
     return {name: value.copy() for name, value in named if isinstance(value, np.ndarray)}
 
 
-def changed(realism: Realism) -> set[str]:
+def changed(physics_params: PhysicsParams) -> set[str]:
     """Names of a model's arrays that differ from the plain model's."""
-    plain, other = (fields(Simulation(PDGains(), each).model) for each in (Realism(), realism))
+    plain, other = (fields(Simulation(PDGains(), each).model) for each in (PhysicsParams(), physics_params))
     return {name for name in plain if not np.array_equal(plain[name], other[name])}
 
 
@@ -41,7 +41,7 @@ def test_friction_is_that_of_every_contact(friction):
 
 def sliding_deceleration(friction: float) -> float:
     """Mean deceleration of a stiffly standing robot that slides at 1 m/s [m/s^2]."""
-    simulation = Simulation(PDGains(500.0, 20.0), Realism(friction=friction))
+    simulation = Simulation(PDGains(500.0, 20.0), PhysicsParams(friction=friction))
     simulation.reset(robot.HOME_POSE)
     simulation.step(robot.HOME_POSE, 500)
     simulation.data.qvel[1] = 1.0  # sideways, where the legs are stiff
@@ -55,15 +55,15 @@ def test_a_sliding_robot_decelerates_with_friction_times_gravity():
 
 
 def test_friction_changes_nothing_else():
-    assert changed(Realism(friction=0.4)) == {"geom_friction"}
-    assert changed(Realism()) == set()
+    assert changed(PhysicsParams(friction=0.4)) == {"geom_friction"}
+    assert changed(PhysicsParams()) == set()
 
 
 # -- Payload -----------------------------------------------------------------------------------------------------------
 
 
 def test_a_payload_adds_its_mass_and_the_inertia_of_a_cube_to_the_trunk():
-    plain, loaded = Simulation(PDGains()).model, Simulation(PDGains(), Realism(payload_kg=3.0)).model
+    plain, loaded = Simulation(PDGains()).model, Simulation(PDGains(), PhysicsParams(payload_kg=3.0)).model
     trunk = plain.body("trunk").id
     mass, inertia = loaded.body_mass - plain.body_mass, loaded.body_inertia - plain.body_inertia
     assert loaded.body_mass.sum() == pytest.approx(robot.MASS + 3.0) and mass[trunk] == pytest.approx(3.0)
@@ -75,7 +75,7 @@ def test_a_payload_adds_its_mass_and_the_inertia_of_a_cube_to_the_trunk():
 def test_a_payload_changes_masses_and_what_follows_from_them_alone():
     derived = {"body_subtreemass", "body_invweight0", "dof_invweight0", "dof_M0", "actuator_acc0"}
     cameras = {"cam_poscom0", "light_poscom0"}  # they follow the centre of mass
-    assert changed(Realism(payload_kg=3.0)) == {"body_mass", "body_inertia"} | derived | cameras
+    assert changed(PhysicsParams(payload_kg=3.0)) == {"body_mass", "body_inertia"} | derived | cameras
 
 
 def test_the_feet_bear_the_payload():
@@ -94,9 +94,9 @@ INERTIA = {"body_invweight0", "dof_invweight0", "dof_M0", "actuator_acc0"}
 """What follows from a model's inertias without a change of its masses."""
 
 
-def torque(error: float, realism: Realism) -> np.ndarray:
+def torque(error: float, physics_params: PhysicsParams) -> np.ndarray:
     """Torques of a resting robot whose joints all miss their targets by an error [rad]."""
-    simulation = Simulation(PDGains(), realism)
+    simulation = Simulation(PDGains(), physics_params)
     simulation.reset(robot.HOME_POSE)
     simulation.data.ctrl[:] = robot.HOME_POSE + error
     mujoco.mj_forward(simulation.model, simulation.data)
@@ -105,12 +105,12 @@ def torque(error: float, realism: Realism) -> np.ndarray:
 
 @pytest.mark.parametrize("strength", [0.5, 0.9, 1.5])
 def test_motor_strength_scales_torques_and_their_limits(strength):
-    np.testing.assert_allclose(torque(0.1, Realism(motor_strength=strength)), strength * 5.0)  # 50 N m/rad
-    np.testing.assert_allclose(torque(9.0, Realism(motor_strength=strength)), strength * robot.TORQUE_LIMIT)
+    np.testing.assert_allclose(torque(0.1, PhysicsParams(motor_strength=strength)), strength * 5.0)  # 50 N m/rad
+    np.testing.assert_allclose(torque(9.0, PhysicsParams(motor_strength=strength)), strength * robot.TORQUE_LIMIT)
 
 
 def test_motor_strength_scales_the_damping():
-    simulation = Simulation(PDGains(50.0, 2.0), Realism(motor_strength=0.8))
+    simulation = Simulation(PDGains(50.0, 2.0), PhysicsParams(motor_strength=0.8))
     simulation.reset(robot.HOME_POSE)
     simulation.data.qvel[6:] = 1.0
     mujoco.mj_forward(simulation.model, simulation.data)
@@ -119,19 +119,19 @@ def test_motor_strength_scales_the_damping():
 
 def test_motor_strength_changes_nothing_else():
     arrays = {"actuator_gainprm", "actuator_biasprm", "actuator_forcerange"}
-    assert changed(Realism(motor_strength=0.9)) == arrays
+    assert changed(PhysicsParams(motor_strength=0.9)) == arrays
 
 
 def test_dry_friction_is_that_of_every_joint_and_of_nothing_else():
-    assert changed(Realism(joint_friction=0.7)) == {"dof_frictionloss"}
-    model = Simulation(PDGains(), Realism(joint_friction=0.7)).model
+    assert changed(PhysicsParams(joint_friction=0.7)) == {"dof_frictionloss"}
+    model = Simulation(PDGains(), PhysicsParams(joint_friction=0.7)).model
     assert model.dof_frictionloss.tolist() == [0.0] * 6 + [0.7] * 12
-    assert not Simulation(PDGains(), Realism(joint_friction=0.0)).model.dof_frictionloss.any()
+    assert not Simulation(PDGains(), PhysicsParams(joint_friction=0.0)).model.dof_frictionloss.any()
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.4, 3.0])
 def test_dry_friction_brakes_a_turning_joint_whatever_its_speed(friction):
-    simulation = Simulation(PDGains(), Realism(joint_friction=friction))
+    simulation = Simulation(PDGains(), PhysicsParams(joint_friction=friction))
     simulation.reset(robot.HOME_POSE)
     simulation.data.qpos[2] = 2.0  # in the air
     simulation.model.actuator_biasprm[:] = simulation.model.actuator_gainprm[:] = 0.0  # limp
@@ -142,10 +142,10 @@ def test_dry_friction_brakes_a_turning_joint_whatever_its_speed(friction):
 
 
 def test_rotor_inertia_is_that_of_every_joint_and_what_follows_alone():
-    assert changed(Realism(rotor_inertia=0.03)) == {"dof_armature"} | INERTIA
-    model = Simulation(PDGains(), Realism(rotor_inertia=0.03)).model
+    assert changed(PhysicsParams(rotor_inertia=0.03)) == {"dof_armature"} | INERTIA
+    model = Simulation(PDGains(), PhysicsParams(rotor_inertia=0.03)).model
     assert model.dof_armature.tolist() == [0.0] * 6 + [0.03] * 12
-    more = model.dof_M0 - Simulation(PDGains(), Realism(rotor_inertia=0.01)).model.dof_M0
+    more = model.dof_M0 - Simulation(PDGains(), PhysicsParams(rotor_inertia=0.01)).model.dof_M0
     np.testing.assert_allclose(more, [0.0] * 6 + [0.02] * 12, atol=1e-12)
 
 
@@ -153,8 +153,8 @@ def test_rotor_inertia_is_that_of_every_joint_and_what_follows_alone():
 
 
 def test_the_contact_time_is_that_of_the_feet_alone():
-    assert changed(Realism(contact_time_s=0.01)) == {"geom_solref"}
-    model = Simulation(PDGains(), Realism(contact_time_s=0.01)).model
+    assert changed(PhysicsParams(contact_time_s=0.01)) == {"geom_solref"}
+    model = Simulation(PDGains(), PhysicsParams(contact_time_s=0.01)).model
     feet = [model.geom(f"{leg}_foot").id for leg in robot.LEGS]
     assert model.geom_solref[feet].tolist() == [[0.01, 1.0]] * 4
     assert (np.delete(model.geom_solref, feet, axis=0) == [0.02, 1.0]).all()
@@ -163,7 +163,7 @@ def test_the_contact_time_is_that_of_the_feet_alone():
 def test_contacts_of_the_feet_have_the_feets_time_and_soft_ones_sink_in():
     depth = {}
     for time_s in (0.005, 0.02, 0.04):
-        simulation = Simulation(PDGains(), Realism(contact_time_s=time_s))
+        simulation = Simulation(PDGains(), PhysicsParams(contact_time_s=time_s))
         simulation.reset(robot.HOME_POSE)
         simulation.step(robot.HOME_POSE, 1000)
         contacts = simulation.data.contact
@@ -216,7 +216,7 @@ def test_a_delayed_action_gives_the_physics_of_one_that_comes_later(delay_ms, co
 
 
 def test_the_delay_is_rounded_to_milliseconds():
-    assert [Realism(action_delay_s=s).delay_steps for s in (0.0, 0.0004, 0.0126, 0.05)] == [0, 0, 13, 50]
+    assert [PhysicsParams(action_delay_s=s).delay_steps for s in (0.0, 0.0004, 0.0126, 0.05)] == [0, 0, 13, 50]
 
 
 def test_a_reset_forgets_the_targets_on_their_way():

@@ -10,7 +10,7 @@ import pytest
 
 from go1_mtl_gym import robot
 from go1_mtl_gym.env import Go1Env
-from go1_mtl_gym.rendering import CONTACT_COLOUR, annotate
+from go1_mtl_gym.rendering import CONTACT_COLOR, annotate
 
 
 @pytest.fixture
@@ -83,7 +83,7 @@ def test_annotations_stop_at_the_capacity_of_the_scene():
         annotate(scene, env.simulation, env.state)
         assert scene.ngeom == expected, "four discs and the command; the robot stands still"
         if expected:
-            np.testing.assert_allclose(scene.geoms[0].rgba, CONTACT_COLOUR, atol=1e-6)
+            np.testing.assert_allclose(scene.geoms[0].rgba, CONTACT_COLOR, atol=1e-6)
             np.testing.assert_allclose(scene.geoms[0].pos[:2], env.simulation.feet_w[0, :2], atol=1e-5)
 
 

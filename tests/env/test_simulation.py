@@ -7,10 +7,10 @@ import pytest
 from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PDGains
 from go1_mtl_gym.env import Go1Env
-from go1_mtl_gym.sim.physics_params import Realism
+from go1_mtl_gym.sim.physics_params import PhysicsParams
 from go1_mtl_gym.sim.simulation import CONTACT_FORCE, PHYSICS_HZ, Simulation
 
-EVERYTHING = Realism(0.5, 2.0, 0.012, 0.9, 0.6, 0.02, 0.01)
+EVERYTHING = PhysicsParams(0.5, 2.0, 0.012, 0.9, 0.6, 0.02, 0.01)
 
 
 @pytest.fixture
@@ -121,7 +121,7 @@ def test_every_control_rate_simulates_the_same_physics(control_hz):
     assert abs((env.state.phase - slow.state.phase + 0.5) % 1.0 - 0.5) < 1e-9
 
 
-# -- Changes of realism ------------------------------------------------------------------------------------------------
+# -- Changes of physics_params ------------------------------------------------------------------------------------
 
 
 def arrays(model: mujoco.MjModel) -> dict[str, np.ndarray]:
@@ -130,12 +130,18 @@ def arrays(model: mujoco.MjModel) -> dict[str, np.ndarray]:
     return {name: value for name, value in named if isinstance(value, np.ndarray)}
 
 
-def test_a_realism_replaces_the_one_before():
+def test_a_physics_params_replaces_the_one_before():
     simulation, plain = Simulation(PDGains(40.0, 1.0), EVERYTHING), Simulation(PDGains(40.0, 1.0))
-    for realism in (Realism(), Realism(payload_kg=1.0), EVERYTHING, Realism(motor_strength=1.1), EVERYTHING):
-        simulation.set_realism(realism)
-        fresh = Simulation(PDGains(40.0, 1.0), realism)
-        assert simulation.realism == realism
+    for physics_params in (
+        PhysicsParams(),
+        PhysicsParams(payload_kg=1.0),
+        EVERYTHING,
+        PhysicsParams(motor_strength=1.1),
+        EVERYTHING,
+    ):
+        simulation.set_physics_params(physics_params)
+        fresh = Simulation(PDGains(40.0, 1.0), physics_params)
+        assert simulation.physics_params == physics_params
         expected = arrays(fresh.model)
         assert all(np.array_equal(value, expected[name]) for name, value in arrays(simulation.model).items())
         for each in (simulation, fresh):
@@ -147,8 +153,8 @@ def test_a_realism_replaces_the_one_before():
 
 def test_after_a_change_a_reset_stands_on_the_ground():
     simulation = Simulation(PDGains())
-    for realism in (EVERYTHING, Realism(contact_time_s=0.1), Realism()):
-        simulation.set_realism(realism)
+    for physics_params in (EVERYTHING, PhysicsParams(contact_time_s=0.1), PhysicsParams()):
+        simulation.set_physics_params(physics_params)
         simulation.reset(robot.HOME_POSE)
         assert simulation.feet_w[:, 2].min() == pytest.approx(robot.FOOT_RADIUS)
         simulation.step(robot.HOME_POSE, 300)
@@ -159,25 +165,25 @@ def test_a_change_while_running_lets_the_actuators_hold_what_they_hold():
     simulation = Simulation(PDGains())
     simulation.reset(robot.HOME_POSE)
     simulation.step(robot.HOME_POSE + 0.1, 20)
-    simulation.set_realism(Realism(action_delay_s=0.01))
+    simulation.set_physics_params(PhysicsParams(action_delay_s=0.01))
     simulation.step(robot.HOME_POSE, 9)
     np.testing.assert_array_equal(simulation.data.ctrl, robot.HOME_POSE + 0.1)
     simulation.step(robot.HOME_POSE, 2)
     np.testing.assert_array_equal(simulation.data.ctrl, robot.HOME_POSE)
 
 
-def test_a_snapshot_brings_its_realism_along():
-    one, other = Simulation(PDGains(), EVERYTHING), Simulation(PDGains(), Realism(friction=1.0))
+def test_a_snapshot_brings_its_physics_params_along():
+    one, other = Simulation(PDGains(), EVERYTHING), Simulation(PDGains(), PhysicsParams(friction=1.0))
     one.reset(robot.HOME_POSE)
     one.step(robot.HOME_POSE + 0.2, 35)
     other.restore(one.snapshot())
-    assert other.realism == EVERYTHING
+    assert other.physics_params == EVERYTHING
     for each in (one, other):
         each.step(robot.HOME_POSE, 60)
     np.testing.assert_array_equal(one.snapshot(), other.snapshot())
 
 
-def test_a_realism_is_a_vector_and_back():
-    assert Realism().as_vector().tolist() == [-1.0, 0.0, 0.0, 1.0, -1.0, -1.0, -1.0]
-    for realism in (Realism(), EVERYTHING, Realism(joint_friction=0.0)):
-        assert Realism.from_vector(realism.as_vector()) == realism
+def test_a_physics_params_is_a_vector_and_back():
+    assert PhysicsParams().as_vector().tolist() == [-1.0, 0.0, 0.0, 1.0, -1.0, -1.0, -1.0]
+    for physics_params in (PhysicsParams(), EVERYTHING, PhysicsParams(joint_friction=0.0)):
+        assert PhysicsParams.from_vector(physics_params.as_vector()) == physics_params

@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from experts.dynamics import FORCE_UNIT, LinearModel, _cross, _euler_rates, _rotation, linearise
+from experts.dynamics import FORCE_UNIT, LinearModel, _cross, _euler_rates, _rotation, linearize
 from go1_mtl_gym import robot
 
 INERTIA_B = np.array([[0.127, 0.001, -0.015], [0.001, 0.394, 0.002], [-0.015, 0.002, 0.423]])
@@ -16,7 +16,7 @@ INPUT = np.array([[4.0, -9.0, 55.0], [0, 3.0, 10.0], [-5.0, 0, 20.0], [2.0, 7.0,
 
 def at_point(dt: float, x: np.ndarray = POINT, u: np.ndarray = INPUT) -> LinearModel:
     """The model of an interval in which the trajectory rests at one point."""
-    return linearise(np.array([x, x]), u[None], FEET[None], INERTIA_B, dt)
+    return linearize(np.array([x, x]), u[None], FEET[None], INERTIA_B, dt)
 
 
 def cross_matrix(r: np.ndarray) -> np.ndarray:
@@ -135,7 +135,7 @@ def test_one_step_follows_the_nonlinear_motion():
     for _ in range(parts):
         k1 = nonlinear(x, INPUT)
         x = x + dt / parts * nonlinear(x + dt / parts / 2 * k1, INPUT)
-    model = linearise(np.array([POINT, x]), INPUT[None], FEET[None], INERTIA_B, dt)
+    model = linearize(np.array([POINT, x]), INPUT[None], FEET[None], INERTIA_B, dt)
     predicted = model.A[0] @ POINT + model.B[0] @ INPUT + model.c[0]
     np.testing.assert_allclose(predicted - x, 0, atol=0.02 * np.abs(x - POINT).max())
     assert np.abs(x - POINT).max() > 0.1
@@ -163,17 +163,17 @@ def test_a_foot_ahead_that_pushes_up_lifts_the_nose_by_hand():
     x[5] = 0.28
     feet = np.zeros((1, 4, 3))
     feet[0, 0] = [0.2, 0.0, 0.0]
-    model = linearise(np.array([x, x]), np.zeros((1, 12)), feet, np.diag([0.1, 0.4, 0.5]), 0.01)
+    model = linearize(np.array([x, x]), np.zeros((1, 12)), feet, np.diag([0.1, 0.4, 0.5]), 0.01)
     np.testing.assert_allclose(model.B[0, 6:9, 2], [0, -0.2 * FORCE_UNIT / 0.4 * 0.01, 0], atol=1e-12)
     np.testing.assert_allclose(model.B[0, 6:9, 0], [0, -0.28 * FORCE_UNIT / 0.4 * 0.01, 0], atol=1e-12)
 
 
-def test_an_interval_is_linearised_in_its_middle():
+def test_an_interval_is_linearized_in_its_middle():
     ends = np.array([POINT, POINT])
     ends[1, :3] += [0.1, -0.2, np.pi / 2]
     ends[0, 3:6] -= 0.05
     middle = (ends[0] + ends[1]) / 2
-    a = linearise(ends, INPUT[None], FEET[None], INERTIA_B, 0.02)
+    a = linearize(ends, INPUT[None], FEET[None], INERTIA_B, 0.02)
     b = at_point(0.02, middle)
     for name in ("A", "B", "c"):
         np.testing.assert_allclose(getattr(a, name), getattr(b, name), atol=1e-12)
@@ -184,8 +184,8 @@ def test_intervals_do_not_mix():
     rng = np.random.default_rng(3)
     states, inputs = POINT + 0.1 * rng.normal(size=(5, 12)), INPUT + 0.1 * rng.normal(size=(4, 12))
     feet = FEET + 0.05 * rng.normal(size=(4, 4, 3))
-    together = linearise(states, inputs, feet, INERTIA_B, 0.02)
+    together = linearize(states, inputs, feet, INERTIA_B, 0.02)
     for k in range(4):
-        alone = linearise(states[k : k + 2], inputs[k : k + 1], feet[k : k + 1], INERTIA_B, 0.02)
+        alone = linearize(states[k : k + 2], inputs[k : k + 1], feet[k : k + 1], INERTIA_B, 0.02)
         for name in ("A", "B", "c"):
             np.testing.assert_allclose(getattr(together, name)[k], getattr(alone, name)[0], atol=1e-13)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experts.dynamics import FORCE_UNIT, linearise
+from experts.dynamics import FORCE_UNIT, linearize
 from experts.mpc import MPC, NU, NX, MPCConfig, QuadraticProgram, Solution
 from go1_mtl_gym import robot
 from go1_mtl_gym.errors import InvalidInputError
@@ -34,7 +34,7 @@ def level(height=0.28) -> tuple:
     u_ref = np.zeros((N, 4, 3))
     u_ref[..., 2] = WEIGHT_N / 4 / FORCE_UNIT
     feet = np.tile(robot.NOMINAL_FOOT_B + [0, 0, 0.023], (N, 1, 1))
-    model = linearise(np.tile(x, (N + 1, 1)), u_ref.reshape(N, 12), feet, np.diag([0.127, 0.394, 0.423]), 0.025)
+    model = linearize(np.tile(x, (N + 1, 1)), u_ref.reshape(N, 12), feet, np.diag([0.127, 0.394, 0.423]), 0.025)
     return model, x, np.tile(x, (N, 1)), u_ref.reshape(N, 12), np.ones((N, 4))
 
 

@@ -207,7 +207,7 @@ def test_a_trots_left_is_its_right(expert, trotting):
 @pytest.mark.parametrize(
     ("figure", "words"),
     [
-        ({"com_height": 0.5}, "com_height"), ({"linearisation": "yesterday"}, "linearisation.*yesterday"),
+        ({"com_height": 0.5}, "com_height"), ({"linearization": "yesterday"}, "linearization.*yesterday"),
         ({"sqp_iterations": 0}, "sqp_iterations"), ({"sqp_tolerance": -1.0}, "sqp_tolerance"),
         ({"whole_body": "magic"}, "whole_body.*magic"), ({"mpc_hz": 1.0}, "mpc_hz"),
         ({"mpc_hz": float("nan")}, "mpc_hz"),

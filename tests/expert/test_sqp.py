@@ -1,4 +1,4 @@
-"""How often the nonlinear program is linearised, and the options that remember."""
+"""How often the nonlinear program is linearized, and the options that remember."""
 
 from dataclasses import replace
 
@@ -12,9 +12,9 @@ from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.sensing.state import RobotState
 
 REMEMBERING = {
-    "shifted": NMPCConfig(linearisation="shifted", sqp_iterations=1),
+    "shifted": NMPCConfig(linearization="shifted", sqp_iterations=1),
     "mpc_hz": NMPCConfig(mpc_hz=100.0),
-    "both": NMPCConfig(linearisation="shifted", mpc_hz=100.0),
+    "both": NMPCConfig(linearization="shifted", mpc_hz=100.0),
 }
 
 
@@ -61,14 +61,14 @@ def test_a_converged_solution_is_a_fixed_point(task, monkeypatch):
     tolerance = 1e-4
     expert = NMPCExpert(config=NMPCConfig(sqp_iterations=20, sqp_tolerance=tolerance))
     calls, problems = [], []
-    linearise, solve = nmpc.linearise, expert._mpc.solve
-    monkeypatch.setattr(nmpc, "linearise", lambda *args: (calls.append(args), linearise(*args))[1])
+    linearize, solve = nmpc.linearize, expert._mpc.solve
+    monkeypatch.setattr(nmpc, "linearize", lambda *args: (calls.append(args), linearize(*args))[1])
     monkeypatch.setattr(expert._mpc, "solve", lambda *args: (problems.append(args), solve(*args))[1])
     states = episode(task, 40, push=0.3)
     for state in states[30:]:
         plan = expert.plan(state, expert._model.dynamics(state))
         _, _, *rest = calls[-1]
-        again = solve(linearise(plan.states, plan.inputs, *rest), *problems[-1][1:])
+        again = solve(linearize(plan.states, plan.inputs, *rest), *problems[-1][1:])
         moved = np.abs(again.states - plan.states[1:])
         assert moved[:, RPY].max() < tolerance and moved[:, COM].max() < 0.28 * tolerance
     assert len(states[30:]) < expert.counters.solves < 20 * len(states[30:])

@@ -10,10 +10,10 @@ import torch
 import trainers
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
 from tests.trainer.stub_env import StubEnv
-from tests.trainer.test_clockless import rows
+from tests.trainer.test_phase_free import rows
 from tests.trainer.test_policy import observations
-from trainers import ClocklessPolicy, MultiHeadPolicy, PhaseEstimator
-from trainers.policies.phase_free import clockless_layout
+from trainers import MultiHeadPolicy, PhaseEstimator, PhaseFreePolicy
+from trainers.policies.phase_free import phase_free_layout
 
 
 @pytest.fixture
@@ -27,22 +27,22 @@ def saved(policy, tmp_path):
 
 
 @pytest.fixture
-def clockless(student, tmp_path):
-    """A clockless policy whose estimator has learned a normalisation, and the file it was saved to."""
-    estimator = PhaseEstimator(clockless_layout(student, 3), width=16, seed=5)
+def phase_free(student, tmp_path):
+    """A phase_free policy whose estimator has learned a normalisation, and the file it was saved to."""
+    estimator = PhaseEstimator(phase_free_layout(student, 3), width=16, seed=5)
     rng = np.random.default_rng(1)
     estimator.normalizer.set(rng.normal(size=estimator.layout.size), rng.uniform(0.5, 2, estimator.layout.size))
-    policy, path = ClocklessPolicy(student, estimator, 0.3), tmp_path / "clockless.zip"
+    policy, path = PhaseFreePolicy(student, estimator, 0.3), tmp_path / "phase_free.zip"
     policy.save(path)
     return policy, path
 
 
 def rewrite(path, changes: dict[str, bytes | None], description: dict | None = None) -> None:
-    """Replace files of an archive, or leave them out, and entries of the description of its clockless part."""
+    """Replace files of an archive, or leave them out, and entries of the description of its phase_free part."""
     with zipfile.ZipFile(path) as archive:
         files = {name: archive.read(name) for name in archive.namelist()}
     known = json.loads(files["policy.json"])
-    known["clockless"] |= description or {}
+    known["phase_free"] |= description or {}
     files |= {"policy.json": json.dumps(known).encode()} | changes
     with zipfile.ZipFile(path, "w") as archive:
         for name, content in files.items():
@@ -96,7 +96,7 @@ def test_failed_save_leaves_the_old_file(saved, monkeypatch):
     assert [p.name for p in path.parent.iterdir()] == ["policy.zip"]
 
 
-def test_degrees_of_realism_travel_with_the_policy(tmp_path):
+def test_degrees_of_physics_params_travel_with_the_policy(tmp_path):
     kwargs = {"friction": 0.5, "payload_kg": 1.0, "action_delay_s": 0.01, "estimator_noise": True, "tasks": ("trot",)}
     env = trainers.make_env("trot", **kwargs)
     policy = MultiHeadPolicy(env.observation_space, env.action_space, width=8, env_kwargs=kwargs)
@@ -150,11 +150,11 @@ def test_inconsistent_description(saved, tmp_path, change):
         trainers.load(tmp_path / "p.zip")
 
 
-@pytest.mark.parametrize("load", [trainers.load, ClocklessPolicy.load])
-def test_clockless_round_trip_is_exact(clockless, load):
-    policy, path = clockless
+@pytest.mark.parametrize("load", [trainers.load, PhaseFreePolicy.load])
+def test_phase_free_round_trip_is_exact(phase_free, load):
+    policy, path = phase_free
     other = load(path)
-    assert isinstance(other, ClocklessPolicy) and not other.training and not other.student.training
+    assert isinstance(other, PhaseFreePolicy) and not other.training and not other.student.training
     assert other.state_dict().keys() == policy.state_dict().keys()
     assert all(torch.equal(a, b) for a, b in zip(other.state_dict().values(), policy.state_dict().values()))
     assert (other.correction, other.env_kwargs) == (policy.correction, policy.env_kwargs)
@@ -168,26 +168,26 @@ def test_clockless_round_trip_is_exact(clockless, load):
         np.testing.assert_array_equal(other_state[0], state[0])
 
 
-def test_a_clockless_file_is_json_and_safetensors_and_saves_to_the_same_bytes(clockless, tmp_path):
-    with zipfile.ZipFile(clockless[1]) as archive:
+def test_a_phase_free_file_is_json_and_safetensors_and_saves_to_the_same_bytes(phase_free, tmp_path):
+    with zipfile.ZipFile(phase_free[1]) as archive:
         assert sorted(archive.namelist()) == ["phase.safetensors", "policy.json", "weights.safetensors"]
         first = {name: archive.read(name) for name in archive.namelist()}
-    assert json.loads(first["policy.json"])["clockless"] == {"history": 3, "width": 16, "correction": 0.3}
-    trainers.load(clockless[1]).save(tmp_path / "again.zip")
+    assert json.loads(first["policy.json"])["phase_free"] == {"history": 3, "width": 16, "correction": 0.3}
+    trainers.load(phase_free[1]).save(tmp_path / "again.zip")
     with zipfile.ZipFile(tmp_path / "again.zip") as archive:
         assert first == {name: archive.read(name) for name in archive.namelist()}
 
 
-def test_a_file_of_the_other_class_says_what_it_holds(clockless, saved):
-    with pytest.raises(trainers.CheckpointError, match="holds a ClocklessPolicy, a MultiHeadPolicy was expected"):
-        MultiHeadPolicy.load(clockless[1])
-    with pytest.raises(trainers.CheckpointError, match="holds a MultiHeadPolicy, a ClocklessPolicy was expected"):
-        ClocklessPolicy.load(saved[1])
+def test_a_file_of_the_other_class_says_what_it_holds(phase_free, saved):
+    with pytest.raises(trainers.CheckpointError, match="holds a PhaseFreePolicy, a MultiHeadPolicy was expected"):
+        MultiHeadPolicy.load(phase_free[1])
+    with pytest.raises(trainers.CheckpointError, match="holds a MultiHeadPolicy, a PhaseFreePolicy was expected"):
+        PhaseFreePolicy.load(saved[1])
 
 
 @pytest.mark.parametrize("name", ["phase.safetensors", "weights.safetensors"])
-def test_missing_and_damaged_weights(clockless, name):
-    path = clockless[1]
+def test_missing_and_damaged_weights(phase_free, name):
+    path = phase_free[1]
     with zipfile.ZipFile(path) as archive:
         whole = archive.read(name)
     rewrite(path, {name: whole[: len(whole) // 2]})
@@ -201,7 +201,7 @@ def test_missing_and_damaged_weights(clockless, name):
 @pytest.mark.parametrize(
     "change", [{"width": 15}, {"history": 2}, {"history": 0}, {"correction": 2.0}, {"width": None}]
 )
-def test_inconsistent_description_of_a_clockless_policy(clockless, change):
-    rewrite(clockless[1], {}, change)
+def test_inconsistent_description_of_a_phase_free_policy(phase_free, change):
+    rewrite(phase_free[1], {}, change)
     with pytest.raises(trainers.CheckpointError, match="does not hold a consistent policy"):
-        trainers.load(clockless[1])
+        trainers.load(phase_free[1])

@@ -62,7 +62,7 @@ def test_rows_of_several_tasks_when_the_task_changes():
 
 
 def test_the_go1s_rows_of_several_tasks_have_the_new_tasks_labels():
-    perturbation = PerturbationConfig(task_interval=(0.3, 0.6), corner_share=0.5, command_interval=(0.2, 0.4))
+    perturbation = PerturbationConfig(task_interval=(0.3, 0.6), corner_fraction=0.5, command_interval=(0.2, 0.4))
     kwargs = {"tasks": ("trot", "jump", "walk"), "channels": ("command", "phase"), "randomization": True}
     demos = collect("jump", None, 1, 3.0, perturbation, kwargs)
     assert len(demos) == 150 and set(demos.task) == {0, 1, 2} and demos.tasks[demos.task[0]] == "jump"
@@ -185,11 +185,11 @@ def test_worker_processes_make_the_same_shards(tmp_path):
     "kwargs",
     [
         {"noise_rad": -1},
-        {"kick_interval": 0},
+        {"push_interval": 0},
         {"command_interval": (3, 1)},
         {"task_interval": (0, 1)},
         {"task_interval": 2.0},
-        {"corner_share": 1.1},
+        {"corner_fraction": 1.1},
     ],
 )
 def test_bad_perturbation(kwargs):

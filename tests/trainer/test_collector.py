@@ -42,7 +42,7 @@ def test_blocks_are_long_and_both_drive():
     collector = make_collector(venv, 2000)
     learner_drove = np.array([np.allclose(a[0], 0.1) for a in drive(collector)])
     assert 0.3 < learner_drove.mean() < 0.7
-    assert collector.learner_share == pytest.approx(learner_drove.mean(), abs=1e-3)
+    assert collector.learner_fraction == pytest.approx(learner_drove.mean(), abs=1e-3)
     changes = np.flatnonzero(np.diff(learner_drove.astype(int)))
     assert np.diff(changes).min() >= 15 and len(changes) > 10
 
@@ -51,7 +51,7 @@ def test_blocks_are_long_and_both_drive():
 def test_extremes_of_beta(beta, share):
     collector = make_collector(DummyVecEnv([StubEnv]), 100, beta)
     drive(collector)
-    assert collector.learner_share == share
+    assert collector.learner_fraction == share
 
 
 def test_finished_environments_are_not_recorded():
@@ -61,7 +61,7 @@ def test_finished_environments_are_not_recorded():
     recorded = collector.recorded()
     assert recorded["obs"][:, SIZE:].sum(0).tolist() == [30, 0, 0, 90]
     by_learner = np.isclose(executed, 0.1).all(2).sum(0)
-    assert by_learner.tolist() == [30, 90] and collector.learner_share == 1.0
+    assert by_learner.tolist() == [30, 90] and collector.learner_fraction == 1.0
 
 
 def test_end_before_a_fall_is_dropped_and_time_limits_are_not():
@@ -97,7 +97,7 @@ def test_takeover_by_the_distance_in_radians():
         student, safety = Student(one_joint_off), {"half_range": half_range, "takeover_rad": limit}
         collector = make_collector(DummyVecEnv([StubEnv]), 200, 0.0, student, **safety)
         drive(collector)
-        assert collector.learner_share == share and (collector.takeovers > 0) == (share == 0.0)
+        assert collector.learner_fraction == share and (collector.takeovers > 0) == (share == 0.0)
     assert 200 / 50 <= collector.takeovers <= 200 / 15 + 1, "each lasts a block of 0.3 to 1 s"
 
 
@@ -114,11 +114,11 @@ class Clumsy:
 def test_takeover_prevents_falls_and_keeps_the_labels():
     free = make_collector(DummyVecEnv([StubEnv, StubEnv]), 150, 0.0, Clumsy())
     drive(free)
-    assert free.falls >= 6 and free.takeovers == 0 and free.learner_share == 1.0
+    assert free.falls >= 6 and free.takeovers == 0 and free.learner_fraction == 1.0
     safety = {"half_range": StubEnv().action_map.half_range, "takeover_rad": 0.05}
     safe = make_collector(DummyVecEnv([StubEnv, StubEnv]), 150, 0.0, Clumsy(), **safety)
     drive(safe)
-    assert safe.falls == 0 and safe.takeovers >= 2 and 0.2 < safe.learner_share < 0.9
+    assert safe.falls == 0 and safe.takeovers >= 2 and 0.2 < safe.learner_fraction < 0.9
     recorded = safe.recorded()
     assert recorded["starts"].sum() == 2
     np.testing.assert_allclose(recorded["acts"], trot_labels(recorded["obs"]), atol=1e-5)
@@ -147,7 +147,7 @@ def test_a_state_advances_whoever_drives_and_is_reset_with_the_episode():
     student = Counting()
     collector = make_collector(venv, 60, beta=0.7, student=student)
     drive(collector)
-    assert 0 < collector.learner_share < 1
+    assert 0 < collector.learner_fraction < 1
     steps = np.arange(60)
     np.testing.assert_array_equal(student.counts, np.column_stack([steps % 20 + 1, steps % 30 + 1]))
     collector.reset()

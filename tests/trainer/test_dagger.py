@@ -60,7 +60,9 @@ def test_falls_and_takeovers_are_noted_and_resuming_does_not_mind(venv, demos, p
     assert free.meta["takeovers"] == 0 and free.meta["falls"] > 0
     assert safe.meta["takeovers"] > 0 and safe.meta["falls"] == 0
     log = json.loads((tmp_path / "log" / "progress.json").read_text())
-    assert log["dagger/takeovers"] == safe.meta["takeovers"] and log["dagger/falls"] == log["dagger/learner_share"] == 0
+    assert (
+        log["dagger/takeovers"] == safe.meta["takeovers"] and log["dagger/falls"] == log["dagger/learner_fraction"] == 0
+    )
     again = trainer(1e-6, "safe").collect_round()
     np.testing.assert_array_equal(again.obs, safe.obs)
     assert again.meta == safe.meta

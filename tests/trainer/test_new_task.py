@@ -11,10 +11,10 @@ from go1_mtl_gym.errors import InvalidInputError
 from tests.trainer.stub_env import SIZE, StubEnv, make_stub
 from trainers import (
     BCConfig,
-    ClocklessPolicy,
     Demonstrations,
     MultiHeadPolicy,
     PhaseEstimator,
+    PhaseFreePolicy,
     closest_task,
     collect,
     learn_task,
@@ -22,7 +22,7 @@ from trainers import (
     offline_metrics,
 )
 from trainers.algorithms.add_task import trunk_features
-from trainers.policies.phase_free import clockless_layout
+from trainers.policies.phase_free import phase_free_layout
 
 TASKS = (*PAPER_TASKS, "pace")
 QUICK = BCConfig(steps=60, batch_size=128, learning_rate=5e-3, weight_decay=0.1, log_interval=30)
@@ -30,7 +30,7 @@ QUICK = BCConfig(steps=60, batch_size=128, learning_rate=5e-3, weight_decay=0.1,
 
 @pytest.fixture
 def trained(student, demos) -> MultiHeadPolicy:
-    """A student that sees its inputs and outputs normalised."""
+    """A student that sees its inputs and outputs normalized."""
     student.fit_normalization(demos.obs, demos.acts)
     return student
 
@@ -154,10 +154,10 @@ def test_a_grown_policy_is_saved_and_rebuilt(trained, tmp_path):
 def test_without_a_clock_it_needs_an_estimator_of_the_new_tasks(trained):
     grown = trained.add_task("pace")
     with pytest.raises(InvalidInputError, match="pace"):
-        ClocklessPolicy(grown, PhaseEstimator(clockless_layout(trained, 2), width=8))
-    clockless = ClocklessPolicy(grown, PhaseEstimator(clockless_layout(grown, 2), width=8, seed=0))
-    env = StubEnv("pace", **clockless.env_kwargs)
-    action, state = clockless.predict(env.reset(seed=0)[0], deterministic=True)
+        PhaseFreePolicy(grown, PhaseEstimator(phase_free_layout(trained, 2), width=8))
+    phase_free = PhaseFreePolicy(grown, PhaseEstimator(phase_free_layout(grown, 2), width=8, seed=0))
+    env = StubEnv("pace", **phase_free.env_kwargs)
+    action, state = phase_free.predict(env.reset(seed=0)[0], deterministic=True)
     assert action.shape == (12,) and state[1].tolist() == [4]
 
 

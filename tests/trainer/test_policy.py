@@ -107,8 +107,8 @@ def test_normalisation(mode):
         np.testing.assert_allclose([inner[:, 0].mean(), inner[:, 0].std()], [0, 1], atol=1e-5)
     if mode == "min_max":
         np.testing.assert_allclose([inner[:, 0].min(), inner[:, 0].max()], [-1, 1], atol=1e-5)
-        normalised = policy.act_normalizer(torch.from_numpy(acts)).numpy()
-        np.testing.assert_allclose([normalised.min(0), normalised.max(0)], [[-1] * 12, [1] * 12], atol=1e-5)
+        normalized = policy.act_normalizer(torch.from_numpy(acts)).numpy()
+        np.testing.assert_allclose([normalized.min(0), normalized.max(0)], [[-1] * 12, [1] * 12], atol=1e-5)
     back = policy.act_normalizer.inverse(policy.act_normalizer(torch.from_numpy(acts)))
     np.testing.assert_allclose(back.numpy(), acts, atol=1e-6)
 

@@ -7,13 +7,13 @@ import pytest
 import trainers
 from go1_mtl_gym import PAPER_TASKS
 from go1_mtl_gym.errors import InvalidInputError
-from trainers import ClocklessPolicy, MultiHeadPolicy
+from trainers import MultiHeadPolicy, PhaseFreePolicy
 from trainers.policies import pretrained
 from trainers.policies.pretrained import FOLDER, PRETRAINED
 
 LARGEST_BYTES = 5_000_000
 """Of all files together."""
-CLASSES = {"clocked": MultiHeadPolicy, "clockless": ClocklessPolicy}
+CLASSES = {"clocked": MultiHeadPolicy, "phase_free": PhaseFreePolicy}
 EVERY = pytest.mark.parametrize("name", PRETRAINED)
 
 
@@ -21,12 +21,12 @@ def test_unknown_names_are_refused_with_a_list_of_what_is_there(student, tmp_pat
     monkeypatch.setattr(pretrained, "FOLDER", tmp_path)
     with pytest.raises(InvalidInputError, match=r"are \[\], got 'clocked'"):
         trainers.load_pretrained()
-    for name in ("clockless", "other"):
+    for name in ("phase_free", "other"):
         student.save(tmp_path / f"{name}.zip")
-    for name in ("clocked", "other", "../clockless", "clockless.zip", None):
-        with pytest.raises(InvalidInputError, match=r"are \['clockless'\], got"):
+    for name in ("clocked", "other", "../phase_free", "phase_free.zip", None):
+        with pytest.raises(InvalidInputError, match=r"are \['phase_free'\], got"):
             trainers.load_pretrained(name)
-    assert isinstance(trainers.load_pretrained("clockless"), MultiHeadPolicy)
+    assert isinstance(trainers.load_pretrained("phase_free"), MultiHeadPolicy)
 
 
 def test_the_files_are_those_named_and_small():

@@ -12,7 +12,7 @@ from trainers import (
     PerturbationConfig,
     collect,
     evaluate,
-    evaluate_switch,
+    evaluate_transition,
     load,
     make_env,
     make_venv,
@@ -55,5 +55,5 @@ def test_clone_correct_save_and_evaluate(tmp_path):
 
 def test_expert_changes_gait():
     for first, second in (("trot", "walk"), ("jump", "trot")):
-        result = evaluate_switch("expert", first, second, 1, before_s=0.5, after_s=4.0)
+        result = evaluate_transition("expert", first, second, 1, before_s=0.5, after_s=4.0)
         assert result.success_rate == 1.0, result

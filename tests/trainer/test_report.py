@@ -42,13 +42,13 @@ def test_a_row_per_task_and_learner_the_expert_first():
     assert pooled[:2] == ["walk", "pooled baseline (no task id)"]
 
 
-def test_the_clockless_student_stands_below_the_student_and_without_one_step_errors():
-    learners = {"pooled": STUDENT, "clockless": EXPERT, "multi_head": STUDENT}
-    student, clockless, pooled = cells(results_table({"tasks": {"trot": learners}}))[2:]
-    assert [row[1].partition(" (")[0] for row in (student, clockless, pooled)] == [
+def test_the_phase_free_student_stands_below_the_student_and_without_one_step_errors():
+    learners = {"pooled": STUDENT, "phase_free": EXPERT, "multi_head": STUDENT}
+    student, phase_free, pooled = cells(results_table({"tasks": {"trot": learners}}))[2:]
+    assert [row[1].partition(" (")[0] for row in (student, phase_free, pooled)] == [
         "multi-head student", "the same without a clock", "pooled baseline",
     ]  # fmt: skip
-    assert clockless[2:] == ["-", "-", "-", "19/20", "20/20", "0.031", "2.50"]
+    assert phase_free[2:] == ["-", "-", "-", "19/20", "20/20", "0.031", "2.50"]
 
 
 def test_undefined_values_are_dashes_and_unknown_learners_keep_their_name():

@@ -150,7 +150,7 @@ def trunk_features(policy: MultiHeadPolicy, dataset: Demonstrations) -> Demonstr
             f"observations must have {size} entries and the task id, got {rows.obs.shape[1] - policy.n_tasks}"
         )
     obs = torch.as_tensor(rows.obs).split(BATCH)
-    features = [policy.actor.trunk(policy._normalised(each.to(policy.device))).cpu() for each in obs]
+    features = [policy.actor.trunk(policy._normalized(each.to(policy.device))).cpu() for each in obs]
     seen = np.hstack([torch.cat(features).numpy(), rows.obs[:, -policy.n_tasks :]])
     return dataclasses.replace(rows, obs=seen)
 

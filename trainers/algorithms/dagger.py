@@ -161,7 +161,7 @@ class DAggerTrainer(imitation_dagger.DAggerTrainer):
         if rows is None:
             collector = self.create_trajectory_collector(seconds)
             self._drive(collector)
-            counts = {name: getattr(collector, name) for name in ("learner_share", "falls", "takeovers")}
+            counts = {name: getattr(collector, name) for name in ("learner_fraction", "falls", "takeovers")}
             for name, value in counts.items():
                 self.logger.record(f"dagger/{name}", value)
             rows = dataclasses.replace(self.base, **collector.recorded(), meta=meta | counts)

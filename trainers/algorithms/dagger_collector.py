@@ -173,7 +173,7 @@ class BlockCollector(InteractiveTrajectoryCollector):
         return sum(len(rows) for rows in self._obs)
 
     @property
-    def learner_share(self) -> float:
+    def learner_fraction(self) -> float:
         """Share of recorded steps that the learner drove."""
         return self._learner_steps / max(1, self._steps)
 

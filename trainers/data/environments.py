@@ -23,10 +23,10 @@ class PerturbationConfig:
 
     Attributes:
         noise_rad: largest standard deviation of the noise on the executed action [rad].
-        kick: largest velocity kick [m/s].
-        kick_interval: mean time between kicks [s].
+        push: largest velocity push [m/s].
+        push_interval: mean time between pushes [s].
         command_interval: shortest and longest time between new commands [s], or None for one command per episode.
-        corner_share: probability with which a new command is a corner of the task's range.
+        corner_fraction: probability with which a new command is a corner of the task's range.
         task_interval: shortest and longest time between changes of task [s], or None for one task per episode.
 
     Raises:
@@ -34,16 +34,16 @@ class PerturbationConfig:
     """
 
     noise_rad: float = 0.06
-    kick: float = 0.2
-    kick_interval: float = 1.5
+    push: float = 0.2
+    push_interval: float = 1.5
     command_interval: tuple[float, float] | None = (1.5, 4.0)
-    corner_share: float = 0.0
+    corner_fraction: float = 0.0
     task_interval: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        if not (self.noise_rad >= 0 and self.kick >= 0 and self.kick_interval > 0):
-            raise InvalidInputError(f"noise_rad and kick must be >= 0 and kick_interval > 0, got {self}")
-        number_in(self.corner_share, 0.0, 1.0, "corner_share")
+        if not (self.noise_rad >= 0 and self.push >= 0 and self.push_interval > 0):
+            raise InvalidInputError(f"noise_rad and push must be >= 0 and push_interval > 0, got {self}")
+        number_in(self.corner_fraction, 0.0, 1.0, "corner_fraction")
         for name in ("command_interval", "task_interval"):
             object.__setattr__(self, name, interval_s(getattr(self, name), name))
 

@@ -12,7 +12,7 @@ from trainers.evaluation.rollout import Rollout, controller, opened, run_all
 from trainers.evaluation.scoring import ClosedLoopResult, EpisodeRecord, score
 
 
-def evaluate_switch(
+def evaluate_transition(
     policy_or_expert: Any,
     first: str,
     second: str,

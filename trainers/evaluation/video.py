@@ -14,7 +14,7 @@ from trainers.data.environments import make_env
 from trainers.evaluation.rollout import begin, controller
 from trainers.utils.files import write_atomically
 
-COLOURS = 128
+COLORS = 128
 """Entries of the palette that all frames of a GIF share."""
 PALETTE_FRAMES = 8
 """Frames that the palette is made from."""
@@ -153,7 +153,7 @@ def save_gif(frames: np.ndarray, path: str | PathLike[str], fps: float = 25) -> 
     if not 1 <= fps <= MAX_FPS:
         raise InvalidInputError(f"fps must be from 1 to {MAX_FPS}, got {fps}")
     some = frames[np.unique(np.linspace(0, len(frames) - 1, PALETTE_FRAMES).round().astype(int))]
-    palette = Image.fromarray(np.concatenate(some)).quantize(COLOURS, method=Image.Quantize.FASTOCTREE)
+    palette = Image.fromarray(np.concatenate(some)).quantize(COLORS, method=Image.Quantize.FASTOCTREE)
     images = [Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
     how = {"save_all": True, "append_images": images[1:], "duration": 10 * round(100 / fps), "loop": 0}
     write_atomically(path, lambda file: images[0].save(file, format="GIF", optimize=False, **how))

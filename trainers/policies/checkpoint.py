@@ -1,6 +1,6 @@
 """Policies on disk: one zip of ``policy.json`` and safetensors files; reading it executes no code.
 
-``weights.safetensors`` holds the student, ``phase.safetensors`` the phase estimator of a clockless one.
+``weights.safetensors`` holds the student, ``phase.safetensors`` the phase estimator of a phase_free one.
 """
 
 import json
@@ -21,7 +21,7 @@ from trainers.utils.files import write_atomically
 
 if TYPE_CHECKING:
     from trainers.policies.multi_head import MultiHeadPolicy
-    from trainers.policies.phase_free import ClocklessPolicy
+    from trainers.policies.phase_free import PhaseFreePolicy
 
 P = TypeVar("P")
 FORMAT = "go1-mtl-gym policy"
@@ -45,7 +45,7 @@ class CheckpointError(InvalidInputError):
     """A file is not a policy that this version can read."""
 
 
-def save(policy: "MultiHeadPolicy | ClocklessPolicy", path: str | PathLike[str]) -> None:
+def save(policy: "MultiHeadPolicy | PhaseFreePolicy", path: str | PathLike[str]) -> None:
     """Write a policy; whoever reads `path` meanwhile sees the old file or the new one, never a part.
 
     Raises:
@@ -62,7 +62,7 @@ def save(policy: "MultiHeadPolicy | ClocklessPolicy", path: str | PathLike[str])
     }
     if student is not policy:
         estimator = policy.estimator
-        description["clockless"] = {
+        description["phase_free"] = {
             "history": estimator.layout.history,
             "width": estimator.width,
             "correction": policy.correction,
@@ -84,7 +84,7 @@ def save(policy: "MultiHeadPolicy | ClocklessPolicy", path: str | PathLike[str])
     write_atomically(path, write)
 
 
-def load(path: str | PathLike[str], device: torch.device | str = "cpu") -> "MultiHeadPolicy | ClocklessPolicy":
+def load(path: str | PathLike[str], device: torch.device | str = "cpu") -> "MultiHeadPolicy | PhaseFreePolicy":
     """Read a policy that was saved, in evaluation mode.
 
     Args:
@@ -103,8 +103,8 @@ def load(path: str | PathLike[str], device: torch.device | str = "cpu") -> "Mult
         policy = MultiHeadPolicy(*spaces, seed=0, **network)
         policy.seed = None
         policy.load_state_dict(weights[WEIGHTS])
-        if "clockless" in description:
-            policy = _clockless(policy, description["clockless"], weights[PHASE_WEIGHTS])
+        if "phase_free" in description:
+            policy = _phase_free(policy, description["phase_free"], weights[PHASE_WEIGHTS])
     except (KeyError, TypeError, ValueError, RuntimeError) as error:
         raise CheckpointError(f"{path} does not hold a consistent policy: {error}") from error
     policy.to(torch.device(device))
@@ -132,15 +132,15 @@ class SavedPolicy:
         return policy
 
 
-def _clockless(
+def _phase_free(
     student: "MultiHeadPolicy", description: dict[str, Any], weights: dict[str, torch.Tensor]
-) -> "ClocklessPolicy":
+) -> "PhaseFreePolicy":
     from trainers.policies.phase_estimator import PhaseEstimator
-    from trainers.policies.phase_free import ClocklessPolicy, clockless_layout
+    from trainers.policies.phase_free import PhaseFreePolicy, phase_free_layout
 
-    estimator = PhaseEstimator(clockless_layout(student, description["history"]), description["width"])
+    estimator = PhaseEstimator(phase_free_layout(student, description["history"]), description["width"])
     estimator.load_state_dict(weights)
-    return ClocklessPolicy(student, estimator, description["correction"])
+    return PhaseFreePolicy(student, estimator, description["correction"])
 
 
 def _to_bytes(module: torch.nn.Module) -> bytes:
@@ -183,7 +183,7 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, dict[str, torch.Tensor]
     if description.get("format_version") != FORMAT_VERSION:
         got = description.get("format_version")
         raise CheckpointError(f"{path} has format version {got!r}; this package reads {FORMAT_VERSION}")
-    wanted = [WEIGHTS, PHASE_WEIGHTS] if "clockless" in description else [WEIGHTS]
+    wanted = [WEIGHTS, PHASE_WEIGHTS] if "phase_free" in description else [WEIGHTS]
     if files != wanted:
         raise CheckpointError(f"{path} is damaged: expected the weights {wanted} in it, got {files}")
     return description, weights

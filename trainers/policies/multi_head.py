@@ -180,17 +180,17 @@ class MultiHeadPolicy(SavedPolicy, ActorCriticPolicy):
             rows: how many there are of each task if they come sorted by task; None looks them up.
         """
         if rows is None:
-            return self._means(self._normalised(obs), obs)
-        return self.act_normalizer.inverse(self.actor.in_blocks(self._normalised(obs), rows))
+            return self._means(self._normalized(obs), obs)
+        return self.act_normalizer.inverse(self.actor.in_blocks(self._normalized(obs), rows))
 
-    def _normalised(self, obs: torch.Tensor) -> torch.Tensor:
+    def _normalized(self, obs: torch.Tensor) -> torch.Tensor:
         return self.obs_normalizer(obs[:, : -self.n_tasks].float()).clamp(-self.clip_sd, self.clip_sd)
 
-    def _means(self, normalised: torch.Tensor, obs: torch.Tensor) -> torch.Tensor:
-        return self.act_normalizer.inverse(self.actor(normalised, self.task_index(obs)))
+    def _means(self, normalized: torch.Tensor, obs: torch.Tensor) -> torch.Tensor:
+        return self.act_normalizer.inverse(self.actor(normalized, self.task_index(obs)))
 
-    def _values(self, normalised: torch.Tensor, obs: torch.Tensor) -> torch.Tensor:
-        return self.critic(torch.cat([normalised, obs[:, -self.n_tasks :].float()], dim=1))
+    def _values(self, normalized: torch.Tensor, obs: torch.Tensor) -> torch.Tensor:
+        return self.critic(torch.cat([normalized, obs[:, -self.n_tasks :].float()], dim=1))
 
     def _gaussian(self, means: torch.Tensor) -> DiagGaussianDistribution:
         return self.action_dist.proba_distribution(means, self.log_std)
@@ -201,18 +201,18 @@ class MultiHeadPolicy(SavedPolicy, ActorCriticPolicy):
         self, obs: torch.Tensor, deterministic: bool = False
     ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         """Actions (n, 12), values (n, 1) and log probabilities (n,)."""
-        normalised = self._normalised(obs)
-        distribution = self._gaussian(self._means(normalised, obs))
+        normalized = self._normalized(obs)
+        distribution = self._gaussian(self._means(normalized, obs))
         actions = distribution.get_actions(deterministic=deterministic)
-        return actions, self._values(normalised, obs), distribution.log_prob(actions)
+        return actions, self._values(normalized, obs), distribution.log_prob(actions)
 
     def evaluate_actions(
         self, obs: torch.Tensor, actions: torch.Tensor
     ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor | None]:
         """Values (n, 1), log probabilities (n,) and entropies (n,) of given actions."""
-        normalised = self._normalised(obs)
-        distribution = self._gaussian(self._means(normalised, obs))
-        return self._values(normalised, obs), distribution.log_prob(actions), distribution.entropy()
+        normalized = self._normalized(obs)
+        distribution = self._gaussian(self._means(normalized, obs))
+        return self._values(normalized, obs), distribution.log_prob(actions), distribution.entropy()
 
     def get_distribution(self, obs: torch.Tensor) -> DiagGaussianDistribution:
         """Distribution of the actions."""
@@ -220,7 +220,7 @@ class MultiHeadPolicy(SavedPolicy, ActorCriticPolicy):
 
     def predict_values(self, obs: torch.Tensor) -> torch.Tensor:
         """Values, shape (n, 1)."""
-        return self._values(self._normalised(obs), obs)
+        return self._values(self._normalized(obs), obs)
 
     def set_training_mode(self, mode: bool) -> None:
         """Switch between training and evaluation; `predict` asks for it each time, and walking all modules is slow."""

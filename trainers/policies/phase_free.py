@@ -25,7 +25,7 @@ PHASE_0 = np.array([0.0, 1.0], dtype=np.float32)
 """Sine and cosine of phase 0."""
 
 
-class ClocklessPolicy(SavedPolicy, BasePolicy):
+class PhaseFreePolicy(SavedPolicy, BasePolicy):
     """A student that learned with a gait clock, and an estimator that takes the clock's place.
 
     Its observation is the student's without the phase, with as many frames of proprioception as the estimator reads.
@@ -72,7 +72,7 @@ class ClocklessPolicy(SavedPolicy, BasePolicy):
         self._turn = np.array([1.0 / (gait.period * self.env_kwargs.get("control_hz", 50)) for gait in gaits])
         self._can_stand = np.array([gait.can_stand for gait in gaits])
         self._command = layout.slices["command"]
-        self._columns = layout.columns(clockless_layout(student, 1))
+        self._columns = layout.columns(phase_free_layout(student, 1))
         self._phase = clocked.slices["phase"].start
 
     def predict(
@@ -134,7 +134,7 @@ class ClocklessPolicy(SavedPolicy, BasePolicy):
     # -- Files ---------------------------------------------------------------------------------------------------------
 
 
-def learn_without_clock(
+def train_phase_free(
     student: MultiHeadPolicy,
     seconds: float = 240.0,
     history: int = 10,
@@ -146,7 +146,7 @@ def learn_without_clock(
     progress: bool = False,
     make_env: EnvFactory = make_env,
     **env_kwargs: Any,
-) -> ClocklessPolicy:
+) -> PhaseFreePolicy:
     """Watch a student walk with its clock, and train an estimator of the phase from what it felt; no expert is asked.
 
     Args:
@@ -165,8 +165,8 @@ def learn_without_clock(
         InvalidInputError: if the student sees no command and phase, or a figure is outside its range.
         CollectionError: if the student keeps falling.
     """
-    estimator = PhaseEstimator(clockless_layout(student, history), seed=seed)
-    policy = ClocklessPolicy(student, estimator, correction)
+    estimator = PhaseEstimator(phase_free_layout(student, history), seed=seed)
+    policy = PhaseFreePolicy(student, estimator, correction)
     shards = max(1, math.ceil(seconds / EPISODE_S))
     walks = [(task, derive_seed("watch", seed, i)) for i in range(shards) for task in estimator.layout.tasks]
     perturbation = perturbation or PerturbationConfig()
@@ -184,7 +184,7 @@ def without_phase(channels: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(name for name in channels if name != "phase")
 
 
-def clockless_layout(student: MultiHeadPolicy, history: int) -> ObservationLayout:
+def phase_free_layout(student: MultiHeadPolicy, history: int) -> ObservationLayout:
     """What an estimator for a student sees: its channels but for the phase, and `history` frames."""
     clocked = student_layout(student)
     return ObservationLayout(clocked.tasks, without_phase(clocked.channels), history)

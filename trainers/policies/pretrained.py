@@ -9,14 +9,14 @@ if TYPE_CHECKING:
     import torch
 
     from trainers.policies.multi_head import MultiHeadPolicy
-    from trainers.policies.phase_free import ClocklessPolicy
+    from trainers.policies.phase_free import PhaseFreePolicy
 
-PRETRAINED = ("clocked", "clockless")
+PRETRAINED = ("clocked", "phase_free")
 """The student of the main job's default preset, and the same without a clock."""
 FOLDER = resources.files("trainers") / "assets"
 
 
-def load_pretrained(name: str = "clocked", device: "torch.device | str" = "cpu") -> "MultiHeadPolicy | ClocklessPolicy":
+def load_pretrained(name: str = "clocked", device: "torch.device | str" = "cpu") -> "MultiHeadPolicy | PhaseFreePolicy":
     """Read a policy that comes with the package, in evaluation mode; its `env_kwargs` make its environment.
 
     Args:

@@ -9,7 +9,7 @@ from go1_mtl_gym.errors import InvalidInputError
 LEARNERS = {
     "expert": "MPC expert",
     "multi_head": "multi-head student",
-    "clockless": "the same without a clock (phase told from raw frames)",
+    "phase_free": "the same without a clock (phase told from raw frames)",
     "pooled": "pooled baseline (no task id)",
     "paper_literal": "paper-literal 34 + K (no command, phase, last action)",
 }

@@ -7,8 +7,8 @@ import trainers
 from go1_mtl_gym import PAPER_TASKS
 from go1_mtl_gym.sensing.observation import ObservationLayout
 from tests.trainer.stub_env import StubEnv
-from trainers import ClocklessPolicy, MultiHeadPolicy, PhaseEstimator
-from trainers.policies.phase_free import clockless_layout
+from trainers import MultiHeadPolicy, PhaseEstimator, PhaseFreePolicy
+from trainers.policies.phase_free import phase_free_layout
 
 CHANNELS = ("command", "phase", "last_action")
 """What the student sees."""
@@ -28,11 +28,11 @@ class Oracle(PhaseEstimator):
         return np.stack([np.sin(turns), np.cos(turns)], axis=1).astype(np.float32)
 
 
-def oracle(student: MultiHeadPolicy, phases, correction: float = 1.0, history: int = 3) -> ClocklessPolicy:
-    """A clockless policy whose estimator answers the phases that a function tells, or always one."""
-    estimator = Oracle(clockless_layout(student, history), width=8)
+def oracle(student: MultiHeadPolicy, phases, correction: float = 1.0, history: int = 3) -> PhaseFreePolicy:
+    """A phase_free policy whose estimator answers the phases that a function tells, or always one."""
+    estimator = Oracle(phase_free_layout(student, history), width=8)
     estimator.phases = phases if callable(phases) else lambda: phases
-    return ClocklessPolicy(student, estimator, correction)
+    return PhaseFreePolicy(student, estimator, correction)
 
 
 def rows(tasks: list[int], command=GO, seed: int = 0) -> np.ndarray:
@@ -55,13 +55,13 @@ def turns(clock: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("task", PAPER_TASKS)
 def test_with_an_oracle_it_acts_exactly_like_the_student(student, task):
     seen, blind = StubEnv(task), StubEnv(task, **BLIND)
-    clockless = oracle(student, lambda: blind.phase)
+    phase_free = oracle(student, lambda: blind.phase)
     (obs, _), (without, _) = seen.reset(seed=3), blind.reset(seed=3)
-    assert clockless.observation_space.contains(without) and without.size == obs.size - 2 + 2 * 34
+    assert phase_free.observation_space.contains(without) and without.size == obs.size - 2 + 2 * 34
     state = None
     for _ in range(60):
         expected = student.predict(obs, deterministic=True)[0]
-        action, state = clockless.predict(without, state, deterministic=True)
+        action, state = phase_free.predict(without, state, deterministic=True)
         np.testing.assert_array_equal(action, expected)
         obs, without = seen.step(expected)[0], blind.step(action)[0]
 
@@ -90,11 +90,11 @@ def test_a_batch_of_mixed_tasks_equals_one_row_at_a_time(student):
 
 
 def test_with_a_correction_of_one_there_is_no_memory(student):
-    obs, clockless = rows([TROT, BOUND, WALK]), oracle(student, 0.3)
-    alone = clockless.predict(obs, deterministic=True)[0]
+    obs, phase_free = rows([TROT, BOUND, WALK]), oracle(student, 0.3)
+    alone = phase_free.predict(obs, deterministic=True)[0]
     for state in [(np.tile([1.0, 0.0], (3, 1)), np.array([TROT, TROT, WALK])), (np.zeros((9, 2)), np.zeros(9))]:
         for starts in (None, np.array([True, False, True])):
-            again = clockless.predict(obs, state, starts, deterministic=True)[0]
+            again = phase_free.predict(obs, state, starts, deterministic=True)[0]
             np.testing.assert_array_equal(again, alone)
 
 
@@ -103,10 +103,10 @@ def test_with_a_correction_of_one_there_is_no_memory(student):
 
 def test_the_clock_turns_and_is_corrected_half_way(student):
     """The half-way mean of two unit vectors has the direction of their bisector; periods .4 s, .32 s and .6 s."""
-    obs, clockless = rows([TROT, BOUND, WALK]), oracle(student, 0.25, 0.5)
-    _, state = clockless.predict(obs)
+    obs, phase_free = rows([TROT, BOUND, WALK]), oracle(student, 0.25, 0.5)
+    _, state = phase_free.predict(obs)
     np.testing.assert_allclose(turns(state[0]), 0.125, atol=1e-6)
-    _, state = clockless.predict(obs, state)
+    _, state = phase_free.predict(obs, state)
     later = 0.125 + 0.02 / np.array([0.4, 0.32, 0.6])
     np.testing.assert_allclose(turns(state[0]), (later + 0.25) / 2, atol=1e-6)
     np.testing.assert_allclose(np.linalg.norm(state[0], axis=1), 1.0, atol=1e-6)
@@ -114,52 +114,52 @@ def test_the_clock_turns_and_is_corrected_half_way(student):
 
 def test_a_quarter_of_the_way_and_the_environments_rate(student):
     student.env_kwargs["control_hz"] = 100
-    clockless = oracle(student, 0.25, 0.25)
-    _, state = clockless.predict(rows([TROT]), (np.array([[0.0, 1.0]]), np.array([TROT])))
+    phase_free = oracle(student, 0.25, 0.25)
+    _, state = phase_free.predict(rows([TROT]), (np.array([[0.0, 1.0]]), np.array([TROT])))
     angle = 2 * np.pi * 0.01 / 0.4
     sine, cosine = 0.75 * np.sin(angle) + 0.25, 0.75 * np.cos(angle)
     np.testing.assert_allclose(turns(state[0]), np.arctan2(sine, cosine) / (2 * np.pi), atol=1e-6)
 
 
 def test_episodes_and_tasks_begin_at_phase_zero(student):
-    clockless = oracle(student, 0.25, 0.5)
+    phase_free = oracle(student, 0.25, 0.5)
     before = (np.tile([0.0, -1.0], (3, 1)), np.array([TROT, BOUND, WALK]))
-    _, state = clockless.predict(rows([TROT, JUMP, WALK]), before, np.array([True, False, False]))
+    _, state = phase_free.predict(rows([TROT, JUMP, WALK]), before, np.array([True, False, False]))
     begun, half = 0.125, (0.5 + 0.02 / 0.6 + 0.25) / 2
     np.testing.assert_allclose(turns(state[0]), [begun, begun, half], atol=1e-6)
 
 
 def test_it_stands_while_the_command_asks_for_it_and_then_walks(student):
-    clockless = oracle(student, 0.25, 0.5)
+    phase_free = oracle(student, 0.25, 0.5)
     still, go = rows([TROT, BOUND, WALK], command=(0.0, 0.0, 0.0)), rows([TROT, BOUND, WALK])
     state = None
     for i in range(5):
-        _, state = clockless.predict(still, state)
+        _, state = phase_free.predict(still, state)
         np.testing.assert_array_equal(state[0][[0, 2]], [[0.0, 1.0]] * 2)
         assert turns(state[0])[1] > 0.12, f"a bound cannot stand, call {i}"
-    _, state = clockless.predict(go, state)
+    _, state = phase_free.predict(go, state)
     later = 0.02 / np.array([0.4, 0.6])
     np.testing.assert_allclose(turns(state[0])[[0, 2]], (later + 0.25) / 2, atol=1e-6)
 
 
 def test_it_runs_on_to_phase_zero_before_it_stands(student):
     answers = iter([0.98, 0.03, 0.4, 0.4])
-    clockless = oracle(student, lambda: next(answers), 0.5)
+    phase_free = oracle(student, lambda: next(answers), 0.5)
     still = rows([TROT], command=(0.0, 0.0, 0.0))
     angle = 2 * np.pi * 0.93
     state = (np.array([[np.sin(angle), np.cos(angle)]]), np.array([TROT]))
     phases = []
     for _ in range(4):
-        _, state = clockless.predict(still, state)
+        _, state = phase_free.predict(still, state)
         phases.append(turns(state[0]).item())
     np.testing.assert_allclose(phases, [-0.02, 0.0, 0.0, 0.0], atol=1e-6)
 
 
 def test_a_correction_back_over_phase_zero_is_no_arrival(student):
-    clockless = oracle(student, 0.85, 0.75)
+    phase_free = oracle(student, 0.85, 0.75)
     angle = 2 * np.pi * 0.02
     state = (np.array([[np.sin(angle), np.cos(angle)]]), np.array([TROT]))
-    _, state = clockless.predict(rows([TROT], command=(0.0, 0.0, 0.0)), state)
+    _, state = phase_free.predict(rows([TROT], command=(0.0, 0.0, 0.0)), state)
     assert -0.15 < turns(state[0]).item() < -0.05
 
 
@@ -169,12 +169,12 @@ def test_the_real_environments_clock_is_followed_through_a_stand():
     env = trainers.make_env("trot", **kwargs)
     base = env.unwrapped
     student = MultiHeadPolicy(env.observation_space, env.action_space, width=8, env_kwargs=kwargs, seed=0)
-    clockless = oracle(student, lambda: info["phase"], 0.3, history=1)
-    columns = base.layout.columns(clockless.estimator.layout)
+    phase_free = oracle(student, lambda: info["phase"], 0.3, history=1)
+    columns = base.layout.columns(phase_free.estimator.layout)
     obs, info = env.reset(seed=0, options={"command": (0.0, 0.0, 0.0)})
     state, errors, standing = None, [], []
     for step in range(150):
-        _, state = clockless.predict(obs[columns], state, np.array([step == 0]))
+        _, state = phase_free.predict(obs[columns], state, np.array([step == 0]))
         errors.append(abs((turns(state[0]).item() - info["phase"] + 0.5) % 1.0 - 0.5))
         standing.append(info["standing"])
         if step in (10, 70):

@@ -14,29 +14,29 @@ from go1_mtl_gym import PAPER_TASKS
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.sensing.observation import ObservationLayout
 from tests.trainer.stub_env import StubEnv, linear_expert, make_stub
-from tests.trainer.test_clockless import BLIND, CHANNELS, TROT, WALK, rows
+from tests.trainer.test_phase_free import BLIND, CHANNELS, TROT, WALK, rows
 from trainers import (
-    ClocklessPolicy,
     MultiHeadPolicy,
     PerturbationConfig,
     PhaseConfig,
     PhaseEstimator,
+    PhaseFreePolicy,
     evaluate,
-    learn_without_clock,
     phase_errors,
+    train_phase_free,
     watch,
 )
-from trainers.policies.phase_free import clockless_layout
+from trainers.policies.phase_free import phase_free_layout
 from trainers.policies.stateful import Learner
 
 QUICK = PhaseConfig(steps=400, batch_size=256)
 
 
 @pytest.fixture
-def clockless(student) -> ClocklessPolicy:
+def phase_free(student) -> PhaseFreePolicy:
     """With an untrained estimator, a clock of its own, and a first knee that never makes the stub fall."""
     student.act_normalizer.scale[2] = 0.0
-    return ClocklessPolicy(student, PhaseEstimator(clockless_layout(student, 3), width=16), 0.3)
+    return PhaseFreePolicy(student, PhaseEstimator(phase_free_layout(student, 3), width=16), 0.3)
 
 
 class Expert(MultiHeadPolicy):
@@ -60,13 +60,13 @@ def expert() -> Expert:
     return Expert(env.observation_space, env.action_space, width=8, env_kwargs=kwargs, seed=0)
 
 
-def test_environments_side_by_side_equal_each_alone(clockless):
+def test_environments_side_by_side_equal_each_alone(phase_free):
     """The state is kept per environment, over the ends of episodes too, which come at different times."""
     lengths = {"trot": 0.3, "walk": 0.5}
     makes = [functools.partial(StubEnv, task, episode_s=s, **BLIND) for task, s in lengths.items()]
     venv, alone = DummyVecEnv(makes), [DummyVecEnv([make]) for make in makes]
     venv.seed(0), alone[0].seed(0), alone[1].seed(1)  # DummyVecEnv seeds environment i with seed + i
-    together, singly = Learner(clockless), [Learner(clockless) for _ in alone]
+    together, singly = Learner(phase_free), [Learner(phase_free) for _ in alone]
     obs, single_obs = venv.reset(), [env.reset() for env in alone]
     starts, single_starts = np.ones(2, dtype=bool), [np.ones(1, dtype=bool)] * 2
     for _ in range(60):
@@ -78,32 +78,32 @@ def test_environments_side_by_side_equal_each_alone(clockless):
         obs, _, starts, _ = venv.step(acts)
 
 
-def test_stable_baselines3_evaluates_it(clockless):
+def test_stable_baselines3_evaluates_it(phase_free):
     makes = [functools.partial(StubEnv, task, episode_s=0.4, **BLIND) for task in PAPER_TASKS]
-    _, lengths = evaluate_policy(clockless, VecMonitor(DummyVecEnv(makes)), 8, return_episode_rewards=True)
+    _, lengths = evaluate_policy(phase_free, VecMonitor(DummyVecEnv(makes)), 8, return_episode_rewards=True)
     assert lengths == [20] * 8
 
 
-def test_evaluation_makes_its_environment_and_keeps_its_state(clockless):
+def test_evaluation_makes_its_environment_and_keeps_its_state(phase_free):
     seen = []
-    clockless.estimator.register_forward_hook(lambda module, args, output: seen.append(args[0].shape))
-    result = evaluate(clockless, "walk", 1, 0.4, make_env=make_stub)
-    assert result.survival_rate == 1.0 and seen == [(1, clockless.estimator.layout.size)] * 20
+    phase_free.estimator.register_forward_hook(lambda module, args, output: seen.append(args[0].shape))
+    result = evaluate(phase_free, "walk", 1, 0.4, make_env=make_stub)
+    assert result.survival_rate == 1.0 and seen == [(1, phase_free.estimator.layout.size)] * 20
 
 
 @pytest.mark.parametrize("duplicate", [copy.deepcopy, lambda policy: pickle.loads(pickle.dumps(policy))])
-def test_copies_act_alike(clockless, duplicate):
-    other, obs = duplicate(clockless), rows([TROT, WALK])
-    (acts, state), (same, _) = (policy.predict(obs, deterministic=True) for policy in (clockless, other))
+def test_copies_act_alike(phase_free, duplicate):
+    other, obs = duplicate(phase_free), rows([TROT, WALK])
+    (acts, state), (same, _) = (policy.predict(obs, deterministic=True) for policy in (phase_free, other))
     np.testing.assert_array_equal(acts, same)
-    acts, same = (policy.predict(obs, state, deterministic=True)[0] for policy in (clockless, other))
+    acts, same = (policy.predict(obs, state, deterministic=True)[0] for policy in (phase_free, other))
     np.testing.assert_array_equal(acts, same)
 
 
-def test_it_says_which_environment_it_is_for(clockless, student):
+def test_it_says_which_environment_it_is_for(phase_free, student):
     expected = {"control_hz": 50, "tasks": PAPER_TASKS, **BLIND}
-    assert clockless.env_kwargs == expected
-    assert clockless.action_space == student.action_space and student.env_kwargs["channels"] == CHANNELS
+    assert phase_free.env_kwargs == expected
+    assert phase_free.action_space == student.action_space and student.env_kwargs["channels"] == CHANNELS
 
 
 # -- Learning ----------------------------------------------------------------------------------------------------------
@@ -112,7 +112,7 @@ def test_it_says_which_environment_it_is_for(clockless, student):
 def test_it_learns_to_walk_without_the_clock():
     teacher = expert()
     generator = torch.random.get_rng_state()
-    policy = learn_without_clock(teacher, 20.0, 3, config=QUICK, make_env=make_stub)
+    policy = train_phase_free(teacher, 20.0, 3, config=QUICK, make_env=make_stub)
     assert torch.equal(torch.random.get_rng_state(), generator)
     assert policy.correction == 1.0 and policy.estimator.layout.history == 3
     held_out, layout = watch(teacher, "trot", 77, 5.0, history=3, make_env=make_stub)
@@ -123,7 +123,7 @@ def test_it_learns_to_walk_without_the_clock():
 
 def test_learning_depends_on_its_arguments_alone():
     def weights(seed: int) -> torch.Tensor:
-        policy = learn_without_clock(expert(), 0.5, 2, config=PhaseConfig(steps=3), seed=seed, make_env=make_stub)
+        policy = train_phase_free(expert(), 0.5, 2, config=PhaseConfig(steps=3), seed=seed, make_env=make_stub)
         return policy.estimator.network[0].weight
 
     assert torch.equal(weights(0), weights(0)) and not torch.equal(weights(0), weights(1))
@@ -137,7 +137,7 @@ def test_long_walks_are_cut_into_episodes_of_their_own_seeds(monkeypatch):
         return watch(policy, task, seed, 0.1, perturbation, history, make_env=kwargs["make_env"])
 
     monkeypatch.setattr("trainers.policies.phase_free.watch", record)
-    learn_without_clock(expert(), 75.0, 2, config=PhaseConfig(steps=1), make_env=make_stub, friction=0.5)
+    train_phase_free(expert(), 75.0, 2, config=PhaseConfig(steps=1), make_env=make_stub, friction=0.5)
     assert [walk[0] for walk in walks] == list(PAPER_TASKS) * 3
     assert {walk[2:] for walk in walks} == {(25.0, PerturbationConfig(), 0.5)} and len({walk[1] for walk in walks}) == 3
 
@@ -145,7 +145,7 @@ def test_long_walks_are_cut_into_episodes_of_their_own_seeds(monkeypatch):
 @pytest.mark.parametrize("arguments", [{"seconds": 0.0}, {"seconds": -1.0}, {"history": 0}, {"correction": 0.0}])
 def test_learning_refuses_impossible_arguments(arguments):
     with pytest.raises(InvalidInputError, match=next(iter(arguments))):
-        learn_without_clock(expert(), make_env=make_stub, **arguments)
+        train_phase_free(expert(), make_env=make_stub, **arguments)
 
 
 # -- Refused -----------------------------------------------------------------------------------------------------------
@@ -154,7 +154,7 @@ def test_learning_refuses_impossible_arguments(arguments):
 @pytest.mark.parametrize("correction", [0.0, -0.1, 1.1, np.nan])
 def test_bad_correction(student, correction):
     with pytest.raises(InvalidInputError, match="correction must lie in"):
-        ClocklessPolicy(student, PhaseEstimator(clockless_layout(student, 1), width=8), correction)
+        PhaseFreePolicy(student, PhaseEstimator(phase_free_layout(student, 1), width=8), correction)
 
 
 @pytest.mark.parametrize(
@@ -168,7 +168,7 @@ def test_bad_correction(student, correction):
 def test_an_estimator_of_something_else(student, tasks, channels, message):
     estimator = PhaseEstimator(ObservationLayout(tasks, channels), width=8)
     with pytest.raises(InvalidInputError, match=message):
-        ClocklessPolicy(student, estimator)
+        PhaseFreePolicy(student, estimator)
 
 
 @pytest.mark.parametrize(
@@ -187,24 +187,24 @@ def test_a_student_that_sees_something_else(kwargs, message):
     if "gravity" not in layout.channels:
         student.observation_space = type(student.observation_space)(-1, 1, (layout.size,), np.float32)
     with pytest.raises(InvalidInputError, match=message):
-        ClocklessPolicy(student, PhaseEstimator(clockless_layout(student, 1), width=8))
+        PhaseFreePolicy(student, PhaseEstimator(phase_free_layout(student, 1), width=8))
 
 
 def test_a_task_that_is_not_registered():
     student = expert()
     student.env_kwargs["tasks"] = ("trot", "jump", "bound", "crawl")
     with pytest.raises(InvalidInputError, match="crawl"):
-        ClocklessPolicy(student, PhaseEstimator(clockless_layout(student, 1), width=8))
+        PhaseFreePolicy(student, PhaseEstimator(phase_free_layout(student, 1), width=8))
 
 
-def test_observations_that_are_none(clockless):
+def test_observations_that_are_none(phase_free):
     obs = rows([TROT, WALK])
     beyond, no_task = obs.copy(), obs.copy()
     beyond[1, 3] = np.nan
     no_task[0, -4:] = 0.5
     for bad, message in ((obs[:, 1:], "finite numbers"), (beyond, "1 that are not finite"), (no_task, "one-hot")):
         with pytest.raises(InvalidInputError, match=message):
-            clockless.predict(bad)
-    _, state = clockless.predict(obs)
+            phase_free.predict(bad)
+    _, state = phase_free.predict(obs)
     with pytest.raises(InvalidInputError, match="state of 1 environments was expected, got one of 2"):
-        clockless.predict(obs[:1], state)
+        phase_free.predict(obs[:1], state)

@@ -25,10 +25,10 @@ from student_report.phase import (
     without_asked,
 )
 from student_report.switching import SwitchingConfig
-from trainers.policies.phase_free import clockless_layout
+from trainers.policies.phase_free import phase_free_layout
 
 TAUGHT, CORRECTED = "taught here", "correction {:g}"
-"""Part of a variant, and part of a finished student that corrects its clock so much; see `trainers.ClocklessPolicy`."""
+"""Part of a variant, and part of a finished student that corrects its clock so much; see `trainers.PhaseFreePolicy`."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ VARIANTS = {
 
 
 @dataclass(frozen=True)
-class ClocklessConfig:
+class PhaseFreeConfig:
     """What all variants share.
 
     Attributes:
@@ -102,13 +102,13 @@ class ClocklessConfig:
         """A student of every variant, and those finished students that are given.
 
         Raises:
-            InvalidInputError: if a finished student is no `trainers.ClocklessPolicy`, or sees what is not recorded.
+            InvalidInputError: if a finished student is no `trainers.PhaseFreePolicy`, or sees what is not recorded.
         """
         finished = [walker for walker in given if walker.path is not None]
         for policy, walker in ((walker.load(), walker) for walker in finished):
-            if not isinstance(policy, trainers.ClocklessPolicy):
+            if not isinstance(policy, trainers.PhaseFreePolicy):
                 kind = type(policy).__name__
-                raise InvalidInputError(f"expected a ClocklessPolicy, got a {kind}: {walker.path}")
+                raise InvalidInputError(f"expected a PhaseFreePolicy, got a {kind}: {walker.path}")
             self.layout.columns(policy.estimator.layout)
         corrected = tuple(CORRECTED.format(correction) for correction in self.corrections)
         own = [Pupil(name, only=(TAUGHT,)) for name in VARIANTS]
@@ -137,7 +137,7 @@ class ClocklessConfig:
         return shard_jobs(self.job, seconds, block, self.job.disturbed(self.noise_rad), self.job.world)
 
 
-QUICK = ClocklessConfig(
+QUICK = PhaseFreeConfig(
     JobConfig(
         n_envs=1,
         history=FRAMES,
@@ -157,16 +157,16 @@ QUICK = ClocklessConfig(
 )
 
 
-def prepare(config: ClocklessConfig, folder: Path, n_jobs: int) -> None:
+def prepare(config: PhaseFreeConfig, folder: Path, n_jobs: int) -> None:
     """Have everything demonstrated that the parts share."""
     trainers.collect_all([*config.training, *config.held_out], folder / "demonstrations", n_jobs, progress=True)
 
 
-def clockless(who: Any, _task: str, what: str, config: ClocklessConfig, seed: int, folder: Path) -> dict[str, Any]:
+def phase_free(who: Any, _task: str, what: str, config: PhaseFreeConfig, seed: int, folder: Path) -> dict[str, Any]:
     """Teach one variant, or take a finished student, and measure how it walks.
 
     Args:
-        who: name of the variant, or a finished `trainers.ClocklessPolicy`.
+        who: name of the variant, or a finished `trainers.PhaseFreePolicy`.
         what: "correction C" of a finished student.
         config: what all share.
         seed: of the evaluation.
@@ -186,7 +186,7 @@ def clockless(who: Any, _task: str, what: str, config: ClocklessConfig, seed: in
     return walk(policy, config, episodes, seed) | {"phase": error}
 
 
-def walk(policy: Any, config: ClocklessConfig, episodes: int, seed: int) -> dict[str, Any]:
+def walk(policy: Any, config: PhaseFreeConfig, episodes: int, seed: int) -> dict[str, Any]:
     """Closed loop of a policy: undisturbed, through changes of gait, and with noisy sensors."""
     job, pairs = config.job, [(a, b) for a in config.job.tasks for b in config.job.tasks if a != b]
 
@@ -197,7 +197,7 @@ def walk(policy: Any, config: ClocklessConfig, episodes: int, seed: int) -> dict
     steady = {task: evaluate(task, episodes, job.episode_s) for task in job.tasks}
     noisy = {task: evaluate(task, job.episodes, config.noisy_s, noise=SensorNoise()) for task in job.tasks}
     trials, spans = config.switching.trials, {name: getattr(config.switching, name) for name in ("before_s", "after_s")}
-    switches = {f"{a} to {b}": trainers.evaluate_switch(policy, a, b, trials, seed, **spans) for a, b in pairs}
+    switches = {f"{a} to {b}": trainers.evaluate_transition(policy, a, b, trials, seed, **spans) for a, b in pairs}
     return {
         "walking": pooled(steady),
         "noisy": pooled(noisy),
@@ -218,7 +218,7 @@ class Lessons:
         folder: of demonstrations and students.
     """
 
-    config: ClocklessConfig
+    config: PhaseFreeConfig
     folder: Path
 
     def student(self, name: str) -> tuple[Any, Estimate | None]:
@@ -243,10 +243,10 @@ class Lessons:
         trainers.train_bc(policy, seen, job.bc)
         return policy
 
-    def _two_stages(self) -> trainers.ClocklessPolicy:
+    def _two_stages(self) -> trainers.PhaseFreePolicy:
         job, history = self.config.job, VARIANTS["two stages"].history
         student = self._kept("clock", lambda: self._one_network(VARIANTS["clock"]))
-        estimator = trainers.PhaseEstimator(clockless_layout(student, history), job.width, job.seed)
+        estimator = trainers.PhaseEstimator(phase_free_layout(student, history), job.width, job.seed)
         phase = trainers.PhaseConfig(job.clone_steps, job.batch_size, seed=job.seed)
         trainers.train_phase(estimator, rows_of(self.config.training, self.folder), self.config.layout, phase)
-        return trainers.ClocklessPolicy(student, estimator)
+        return trainers.PhaseFreePolicy(student, estimator)
