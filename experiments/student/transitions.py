@@ -57,9 +57,8 @@ class Transitions(Study):
 
     def table(self, results: Results) -> str:
         """Per agent and first gait: successes to each second gait, and survivals of all together."""
-        gaits = distinct(results.records, "task")
-        rates = transition_rates(results)
-        rows = []
+        rates, rows = transition_rates(results), []
+        gaits = gaits_of(rates)
         for agent in distinct(results.records, "agent"):
             for (first,), members in group(results.of(agent=agent), ["task"]).items():
                 cells = [count(rates[agent].get((first, second), Rate(0, 0))) for second in gaits]
@@ -68,7 +67,8 @@ class Transitions(Study):
 
     def figure(self, results: Results) -> Figure:
         """One matrix per agent, from the row's gait to the column's."""
-        gaits, rates = distinct(results.records, "task"), transition_rates(results)
+        rates = transition_rates(results)
+        gaits = gaits_of(rates)
         figure = plots.new_figure((1.3 + 0.75 * len(gaits)) * len(rates) + 0.5, 1.4 + 0.62 * len(gaits))
         axes = figure.subplots(1, len(rates), squeeze=False)[0]
         for ax, (agent, pairs) in zip(axes, rates.items()):
@@ -93,3 +93,9 @@ def transition_rates(results: Results, key: str = "succeeded") -> dict[str, dict
         if condition.startswith("to "):
             found.setdefault(agent, {})[first, condition.removeprefix("to ")] = members.rate(key)
     return found
+
+
+def gaits_of(rates: dict[str, dict[tuple[str, str], Rate]]) -> list[str]:
+    """Every gait that is changed from or to."""
+    pairs = [pair for own in rates.values() for pair in own]
+    return list(dict.fromkeys([first for first, _ in pairs] + [second for _, second in pairs]))
