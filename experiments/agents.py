@@ -1,7 +1,7 @@
 """Who is measured: the expert, the policies that come with the package, policy files, and methods that train theirs."""
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -41,8 +41,18 @@ class Agent:
         """A text that changes whenever another agent is meant."""
         return repr((self.name, self.seed, sorted(self.env_kwargs.items())))
 
+    @property
+    def label(self) -> str:
+        """Its name, and the seed of its training if it has one."""
+        return self.name if self.seed is None else f"{self.name}, seed {self.seed}"
+
+    @property
+    def origin(self) -> Hashable | None:
+        """What `prepare` makes, equal for agents that are made together; None if there is nothing to be made."""
+        return None
+
     def prepare(self) -> float:
-        """Make what it is read from, on one thread; returns how long that takes or took [s]."""
+        """Make what the agent is read from, on one thread; returns how long that took, whenever it was [s]."""
         return 0.0
 
     def load(self) -> Any:

@@ -11,7 +11,7 @@ import json
 import os
 import re
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -111,7 +111,7 @@ class Study(abc.ABC):
         """The results as a picture; None if there is nothing to draw."""
         return None
 
-    def prepare(self, n_jobs: int) -> None:
+    def prepare(self, n_jobs: int) -> None:  # noqa: B027
         """Make what the cells share."""
 
     def more(self) -> dict[str, Any]:
@@ -125,7 +125,7 @@ class Study(abc.ABC):
 
     def cell_path(self, agent: Agent, cell: Cell, seed: int) -> Path:
         """File of a finished cell; its name changes with anything that could change its metrics."""
-        words = (agent.name, "" if agent.seed is None else f"seed{agent.seed}", cell.task, cell.condition)
+        words = (agent.label, cell.task, cell.condition)
         stem = re.sub(r"[^\w.-]+", "_", "-".join(filter(None, words)))
         return self.cache / self.name / f"{stem}-{self._digest(agent.identity, repr(cell), str(seed))}.json"
 
@@ -215,9 +215,9 @@ def run(study: Study, seed: int, n_jobs: int = 1, command: str = "", only: Seque
     chosen = [(agent, cell) for agent in agents for cell in study.cells(agent) if _is_in(agent, cell, only)]
     if not chosen:
         raise InvalidInputError(f"{' '.join(only) or 'this'} leaves nothing to measure in {study.name}")
-    used = list(dict.fromkeys(agent.name + str(agent.seed) for agent, _ in chosen))
-    agents = [agent for agent in agents if agent.name + str(agent.seed) in used]
-    training_s = _side_by_side([agent.prepare for agent in agents], n_jobs, f"{study.name}: agents")
+    agents = [agent for agent in agents if any(agent is other for other, _ in chosen)]
+    origins = {agent.origin: agent.prepare for agent in agents if agent.origin is not None}
+    training_s = _side_by_side([*origins.values()], n_jobs, f"{study.name}: training")
     measurements = [Measurement(study, agent, cell, seed) for agent, cell in chosen]
     paths = [study.cell_path(each.agent, each.cell, seed) for each in measurements]
     if not all(path.is_file() for path in paths):
@@ -233,7 +233,7 @@ def run(study: Study, seed: int, n_jobs: int = 1, command: str = "", only: Seque
         machine=machine(getattr(study.options, "device", "cpu")),
         seconds={name: round(value, 1) for name, value in seconds.items() if value},
         records=tuple(record for each in finished for record in each["records"]),
-        policies={agent.name: agent.sha256 for agent in agents if hasattr(agent, "sha256")},
+        policies={agent.label: agent.sha256 for agent in agents if hasattr(agent, "sha256")},
         more=json_ready(study.more()),
     )
 
@@ -245,16 +245,12 @@ def _is_in(agent: Agent, cell: Cell, only: Sequence[str]) -> bool:
 
 
 def _side_by_side(calls: Sequence[Any], n_jobs: int, title: str) -> list[Any]:
-    results = _results(calls, n_jobs)
-    return list(tqdm(results, title, len(calls), unit="cell", disable=None))
-
-
-def _results(calls: Sequence[Any], n_jobs: int) -> Iterator[Any]:
-    if n_jobs == 1 or len(calls) == 1:
-        yield from (call() for call in calls)
+    if n_jobs == 1 or len(calls) < 2:
+        results = (call() for call in calls)
     else:
         parallel = joblib.Parallel(n_jobs=n_jobs, return_as="generator")
-        yield from parallel(joblib.delayed(WithTasks(call))() for call in calls)
+        results = parallel(joblib.delayed(WithTasks(call))() for call in calls)
+    return list(tqdm(results, title, len(calls), unit="cell", disable=None if calls else True))
 
 
 # -- Options -----------------------------------------------------------------------------------------------------------
