@@ -107,6 +107,10 @@ class Study(abc.ABC):
     def table(self, results: Results) -> str:
         """The results in Markdown."""
 
+    def paragraphs(self, results: Results) -> list[str]:
+        """The section of a page, between its heading and the picture."""
+        return [self.table(results), *filter(None, [self.note])]
+
     def figure(self, results: Results) -> Figure | None:
         """The results as a picture; None if there is nothing to draw."""
         return None
