@@ -5,7 +5,7 @@ One call runs once through the chain
     state -> Pinocchio -> reference and footholds -> rigid-body model, linearized -> QP -> ground forces
           -> whole-body torques -> joint targets of the PD actuators.
 
-What is nonlinear in it. The model of `experts.dynamics` is: attitude kinematics, lever arms, gyroscopic moments, an
+What is nonlinear in it. The model of `experts.mpc.srbd` is: attitude kinematics, lever arms, gyroscopic moments, an
 inertia that is computed anew from the configuration at every call. Each call linearizes it along the reference and
 solves a QP, as convex MPC does. If the solution stays within `sqp_tolerance` of the trajectory that it was linearized
 along, as it does in steady walking, that is all; if not, as after a push, the model is linearized again along the
@@ -29,18 +29,20 @@ from itertools import pairwise
 
 import numpy as np
 
-from experts.dynamics import COM, FORCE_UNIT, RPY, linearize
-from experts.footholds import FootholdRule
-from experts.jacobian_transpose import jacobian_transpose_torques
-from experts.model import Dynamics, RobotModel
-from experts.mpc import LARGEST, MPC, MPCConfig, Solution
-from experts.nominal import NominalMotion, nominal_motion, standing_motion
-from experts.planar import to_complex, turn
-from experts.reference import body_reference
-from experts.swing import SwingRule
-from experts.trajectory import Frame, Recall, Trajectory
-from experts.whole_body import joint_torques
-from experts.whole_body_qp import WholeBodyQP
+from experts.mpc.config import MPCConfig
+from experts.mpc.controller import MPC, Solution
+from experts.mpc.srbd import COM, FORCE_UNIT, RPY, linearize
+from experts.mpc.warm_start import Frame, Recall, Trajectory
+from experts.planning.body_reference import body_reference
+from experts.planning.footholds import FootholdRule
+from experts.planning.nominal_motion import NominalMotion, nominal_motion, standing_motion
+from experts.planning.plane import to_complex, turn
+from experts.planning.swing import SwingRule
+from experts.plausibility import LARGEST
+from experts.robot_model import Dynamics, RobotModel
+from experts.whole_body.inverse_dynamics import joint_torques
+from experts.whole_body.jacobian_transpose import jacobian_transpose_torques
+from experts.whole_body.qp import WholeBodyQP
 from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PDGains
 from go1_mtl_gym.sensing.state import RobotState

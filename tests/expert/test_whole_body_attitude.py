@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experts.model import RobotModel
 from experts.nmpc import SHORTEST_PIECE_S, contact_pieces, whole_body_attitude
+from experts.robot_model import RobotModel
 from go1_mtl_gym import GAITS, robot
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from experts.model import RobotModel
-from experts.whole_body import STANCE_DAMPING, joint_torques
+from experts.robot_model import RobotModel
+from experts.whole_body.inverse_dynamics import STANCE_DAMPING, joint_torques
 from go1_mtl_gym import robot
 
 STANCES = [(True,) * 4, (True, False, False, True), (True, True, True, False), (False,) * 4]

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experts.nominal import NominalMotion, nominal_motion, standing_motion
-from experts.reference import body_reference
+from experts.planning.body_reference import body_reference
+from experts.planning.nominal_motion import NominalMotion, nominal_motion, standing_motion
 from go1_mtl_gym import GAITS
 from go1_mtl_gym.sensing.state import RobotState
 

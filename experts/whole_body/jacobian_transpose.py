@@ -1,14 +1,14 @@
 """Joint torques the simple way: the transpose of the Jacobian in stance, one leg at a time in swing.
 
 The usual form of small quadrupeds (G. Bledt et al., "MIT Cheetah 3", IROS 2018, equations 3 and 4): the ground force of
-a foot acts through massless legs, and a swinging leg is driven as if its hip stood still. `experts.whole_body` uses the
-full dynamics instead.
+a foot acts through massless legs, and a swinging leg is driven as if its hip stood still.
+`experts.whole_body.inverse_dynamics` uses the full dynamics instead.
 """
 
 import numpy as np
 
-from experts.model import Dynamics
-from experts.whole_body import STANCE_DAMPING
+from experts.robot_model import Dynamics
+from experts.whole_body.inverse_dynamics import STANCE_DAMPING
 from go1_mtl_gym import robot
 
 

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from experts.dynamics import FORCE_UNIT, linearize
-from experts.mpc import MPC, NU, NX, MPCConfig, QuadraticProgram, Solution
+from experts.mpc.config import NU, NX, MPCConfig
+from experts.mpc.controller import MPC, Solution
+from experts.mpc.program import QuadraticProgram
+from experts.mpc.srbd import FORCE_UNIT, linearize
 from go1_mtl_gym import robot
 from go1_mtl_gym.errors import InvalidInputError
 

@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from experts.model import Dynamics, RobotModel, to_pinocchio
+from experts.robot_model import Dynamics, RobotModel, to_pinocchio
 from go1_mtl_gym import robot
 from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.sensing.state import RobotState

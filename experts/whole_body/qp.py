@@ -1,7 +1,7 @@
 """From ground forces and swing accelerations to joint torques, as a small quadratic program that knows the limits.
 
-`experts.whole_body` answers the same question in closed form and clips. Here what cannot be had is given up where it
-matters least. With M, h, J of `Dynamics` the equations of motion
+`experts.whole_body.inverse_dynamics` answers the same question in closed form and clips. Here what cannot be had is
+given up where it matters least. With M, h, J of `Dynamics` the equations of motion
 
     (1)  M vdot + h = S' tau + J' f
 
@@ -23,9 +23,9 @@ import numpy as np
 import osqp
 from scipy import sparse
 
-from experts.model import Dynamics
-from experts.mpc import LARGEST
-from experts.whole_body import STANCE_DAMPING, joint_torques
+from experts.plausibility import LARGEST
+from experts.robot_model import Dynamics
+from experts.whole_body.inverse_dynamics import STANCE_DAMPING, joint_torques
 from go1_mtl_gym import robot
 from go1_mtl_gym.validation import number_in
 

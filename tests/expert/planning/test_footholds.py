@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experts.footholds import FootholdRule, next_touchdown
+from experts.planning.footholds import FootholdRule, next_touchdown
 from go1_mtl_gym import GAITS, robot
 from go1_mtl_gym.errors import InvalidInputError
 

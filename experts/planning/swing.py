@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from experts.footholds import FootholdRule
-from experts.model import Dynamics
-from experts.planar import to_complex
+from experts.planning.footholds import FootholdRule
+from experts.planning.plane import to_complex
+from experts.robot_model import Dynamics
 from go1_mtl_gym import robot
 from go1_mtl_gym.sensing.state import RobotState
 

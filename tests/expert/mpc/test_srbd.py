@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from experts.dynamics import FORCE_UNIT, LinearModel, _cross, _euler_rates, _rotation, linearize
+from experts.mpc.srbd import FORCE_UNIT, LinearModel, _cross, _euler_rates, _rotation, linearize
 from go1_mtl_gym import robot
 
 INERTIA_B = np.array([[0.127, 0.001, -0.015], [0.001, 0.394, 0.002], [-0.015, 0.002, 0.423]])

@@ -3,7 +3,7 @@
 import numpy as np
 from numba import njit
 
-from experts.nominal import NominalMotion
+from experts.planning.nominal_motion import NominalMotion
 from go1_mtl_gym.sensing.state import RobotState
 
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from experts.model import RobotModel
-from experts.nominal import SAMPLES, SWAY, NominalMotion, nominal_motion, standing_motion
+from experts.planning.nominal_motion import SAMPLES, SWAY, NominalMotion, nominal_motion, standing_motion
+from experts.robot_model import RobotModel
 from go1_mtl_gym import GAITS, robot
 from go1_mtl_gym.gaits import Gait
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from experts import NMPCExpert
-from experts.model import RobotModel
-from experts.nominal import nominal_motion
-from experts.phase import LAG_S, SAMPLES, TRAIL_S, PhaseScales, _cycle, _residuals, fit_phase
-from experts.swing import SwingRule
+from experts.phase_fitting import LAG_S, SAMPLES, TRAIL_S, PhaseScales, _cycle, _residuals, fit_phase
+from experts.planning.nominal_motion import nominal_motion
+from experts.planning.swing import SwingRule
+from experts.robot_model import RobotModel
 from go1_mtl_gym import GAITS, robot
 from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.sensing.state import RobotState

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from experts.planar import carried, to_complex, turn
+from experts.planning.plane import carried, to_complex, turn
 
 
 def test_horizontal_parts_become_complex():

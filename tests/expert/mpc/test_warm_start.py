@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experts.dynamics import FORCE_UNIT
-from experts.trajectory import WORLD, Frame, Recall, Trajectory
+from experts.mpc.srbd import FORCE_UNIT
+from experts.mpc.warm_start import WORLD, Frame, Recall, Trajectory
 from go1_mtl_gym import GAITS
 
 TROT, DT = GAITS["trot"], 0.025

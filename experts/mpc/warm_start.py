@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experts.dynamics import COM, FORCE_UNIT, OMEGA, RPY, VELOCITY
+from experts.mpc.srbd import COM, FORCE_UNIT, OMEGA, RPY, VELOCITY
 from go1_mtl_gym.gaits import Gait
 from go1_mtl_gym.sensing.state import RobotState
 

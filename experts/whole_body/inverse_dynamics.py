@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from experts.model import Dynamics
+from experts.robot_model import Dynamics
 from go1_mtl_gym import robot
 
 STANCE_DAMPING = 10.0

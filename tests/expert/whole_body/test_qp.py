@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from experts.jacobian_transpose import jacobian_transpose_torques
-from experts.model import Dynamics, RobotModel
-from experts.whole_body import STANCE_DAMPING, joint_torques
-from experts.whole_body_qp import WholeBodyConfig, WholeBodyQP, _without_limits
+from experts.robot_model import Dynamics, RobotModel
+from experts.whole_body.inverse_dynamics import STANCE_DAMPING, joint_torques
+from experts.whole_body.jacobian_transpose import jacobian_transpose_torques
+from experts.whole_body.qp import WholeBodyConfig, WholeBodyQP, _without_limits
 from go1_mtl_gym import robot
 from go1_mtl_gym.errors import InvalidInputError
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from experts.footholds import FootholdRule
-from experts.model import Dynamics, RobotModel
-from experts.swing import SwingRule, cubic, hump
+from experts.planning.footholds import FootholdRule
+from experts.planning.swing import SwingRule, cubic, hump
+from experts.robot_model import Dynamics, RobotModel
 from go1_mtl_gym import GAITS, robot
 from go1_mtl_gym.sensing.state import RobotState
 

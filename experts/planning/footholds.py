@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from experts.planar import to_complex
+from experts.planning.plane import to_complex
 from go1_mtl_gym import robot
 from go1_mtl_gym.gaits import Gait
 from go1_mtl_gym.sensing.state import RobotState

@@ -8,9 +8,10 @@ import pytest
 from scipy.optimize import nnls
 from scipy.sparse.linalg import spsolve_triangular
 
-from experts.dynamics import FORCE_UNIT
-from experts.mpc import MPC, MPCConfig, QuadraticProgram
-from experts.solvers import SOLVERS
+from experts.mpc import MPC, MPCConfig
+from experts.mpc.program import QuadraticProgram
+from experts.mpc.solvers import SOLVERS
+from experts.mpc.srbd import FORCE_UNIT
 
 N = MPCConfig().steps
 DYNAMICS = 12 * N
