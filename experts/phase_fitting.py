@@ -24,11 +24,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from experts.nmpc import NMPCConfig, whole_body_attitude
+from experts.planning.body_reference import COM_HEIGHT
 from experts.planning.nominal_motion import SAMPLES, nominal_motion
 from experts.planning.plane import carried, to_complex, turn
 from experts.planning.swing import SwingRule, cubic, hump
-from experts.robot_model import RobotModel
+from experts.robot_model import RobotModel, whole_body_attitude
 from go1_mtl_gym import robot
 from go1_mtl_gym.gaits import Gait
 from go1_mtl_gym.sensing.state import RobotState
@@ -117,7 +117,7 @@ def fit_phase(
     model: RobotModel | None = None,
     scales: PhaseScales | None = None,
     swing: SwingRule | None = None,
-    com_height: float = NMPCConfig.com_height,
+    com_height: float = COM_HEIGHT,
 ) -> PhaseFit:
     """The phase of `state.gait` whose nominal motion fits a state best; `state.phase` is ignored.
 

@@ -1,10 +1,13 @@
 """Where the body should be over the horizon: the command, integrated from here, plus the gait's nominal motion."""
 
 import numpy as np
-from numba import njit
 
+from experts.compilation import compiled
 from experts.planning.nominal_motion import NominalMotion
 from go1_mtl_gym.sensing.state import RobotState
+
+COM_HEIGHT = 0.28
+"""Mean height of the centre of mass [m], unless the expert's configuration says otherwise."""
 
 
 def body_reference(
@@ -33,9 +36,11 @@ def body_reference(
     return _integrate(deviation, yaw, com_w, com_height, state.command, dt)
 
 
-@njit(cache=True)
-def _integrate(deviation, yaw, com_w, com_height, command, dt):
-    """`body_reference` from the nominal motion's deviations; compiled."""
+@compiled
+def _integrate(
+    deviation: np.ndarray, yaw: float, com_w: np.ndarray, com_height: float, command: np.ndarray, dt: float
+) -> np.ndarray:
+    """`body_reference` from the nominal motion's deviations, shape (N + 1, 12)."""
     x = np.empty((len(deviation), 12))
     vx, vy, yaw_rate = command
     px, py = com_w[0], com_w[1]
@@ -45,8 +50,11 @@ def _integrate(deviation, yaw, com_w, com_height, command, dt):
         cos, sin = np.cos(angle), np.sin(angle)
         going_x, going_y = cos * vx - sin * vy, sin * vx + cos * vy
         if k:
+            # By trapezoids, as the commanded velocity turns with the heading.
             px, py = px + (going_x + before_x) * dt / 2, py + (going_y + before_y) * dt / 2
         before_x, before_y = going_x, going_y
+        # The sway counts from the robot's place in the cycle, so that the reference begins where the robot is; height
+        # and tilt are those of the cycle itself, so that they come back to it.
         d, first = deviation[k], deviation[0]
         x[k, 0], x[k, 1], x[k, 2] = d[0], d[1], angle + d[2] - first[2]
         cos_0, sin_0 = np.cos(yaw), np.sin(yaw)

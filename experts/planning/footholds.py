@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from experts.compilation import compiled
 from experts.planning.plane import to_complex
 from go1_mtl_gym import robot
 from go1_mtl_gym.gaits import Gait
@@ -21,7 +21,7 @@ class FootholdRule:
         reach: largest horizontal distance between a foothold and the point under its hip [m].
 
     Raises:
-        InvalidInputError: if a figure is outside its range.
+        InvalidInputError: if a number is outside its range.
     """
 
     velocity_gain: float = 0.03
@@ -45,17 +45,16 @@ class FootholdRule:
         Returns:
             Centres of the feet on the ground, world [m], shape (..., 4, 3).
         """
-        times = touchdown_s.reshape(-1, 4)
-        feet = _plan(
+        points = _plan(
             to_complex(com_w),
             to_complex(velocity_w),
             state.rpy[2],
             state.command,
             state.gait.nominal_feet_b,
-            np.array([state.gait.stance_s / 2, self.velocity_gain, self.reach]),
-            times,
+            np.array([state.gait.stance_s / 2, self.velocity_gain, self.reach, robot.FOOT_RADIUS]),
+            touchdown_s.reshape(-1, 4),
         )
-        return feet.reshape(*touchdown_s.shape, 3)
+        return points.reshape(*touchdown_s.shape, 3)
 
     def over_horizon(
         self, state: RobotState, com_w: np.ndarray, velocity_w: np.ndarray, feet_w: np.ndarray, middle: np.ndarray
@@ -85,19 +84,29 @@ def next_touchdown(gait: Gait, phase: float, later: np.ndarray) -> np.ndarray:
     return (np.floor(later[:, None] + offsets) - offsets - phase) * gait.period
 
 
-@njit(cache=True)
-def _plan(com, velocity, yaw, command, feet_b, rule, touchdown_s):
-    """`FootholdRule.plan` in complex numbers, x + iy; compiled. `rule`: half a stance [s], gain [s], reach [m]."""
-    half_stance, gain, reach = rule
+@compiled
+def _plan(
+    com: complex,
+    velocity: complex,
+    yaw: float,
+    command: np.ndarray,
+    feet_b: np.ndarray,
+    rule: np.ndarray,
+    touchdown_s: np.ndarray,
+) -> np.ndarray:
+    """`FootholdRule.plan` in complex numbers, x + iy. `rule`: half a stance, gain [s], reach and foot radius [m]."""
+    half_stance, gain, reach, radius = rule
     heading = np.exp(1j * yaw)
-    wanted = (command[0] + 1j * command[1]) * heading
-    feet = np.empty((len(touchdown_s), 4, 3))
+    commanded = (command[0] + 1j * command[1]) * heading
+    points = np.empty((len(touchdown_s), 4, 3))
     for i in range(len(touchdown_s)):
         for leg in range(4):
             time = touchdown_s[i, leg]
+            # From the centre of mass to the hip when the foot touches down: the body turns on meanwhile.
             arm = (feet_b[leg, 0] + 1j * feet_b[leg, 1]) * heading * np.exp(1j * command[2] * time)
-            step = (velocity + 1j * command[2] * arm) * half_stance + gain * (velocity - wanted)
+            # i yaw_rate arm is what turning adds to the hip's velocity.
+            step = (velocity + 1j * command[2] * arm) * half_stance + gain * (velocity - commanded)
             step *= min(1.0, reach / max(abs(step), 1e-9))
             point = com + velocity * time + arm + step
-            feet[i, leg, 0], feet[i, leg, 1], feet[i, leg, 2] = point.real, point.imag, robot.FOOT_RADIUS
-    return feet
+            points[i, leg, 0], points[i, leg, 1], points[i, leg, 2] = point.real, point.imag, radius
+    return points

@@ -8,8 +8,10 @@ a foot acts through massless legs, and a swinging leg is driven as if its hip st
 import numpy as np
 
 from experts.robot_model import Dynamics
-from experts.whole_body.inverse_dynamics import STANCE_DAMPING
-from go1_mtl_gym import robot
+from experts.whole_body.request import Request, within_limits
+
+_LEGS = np.arange(12).reshape(4, 3)
+_ROWS, _COLUMNS = _LEGS[:, :, None], _LEGS[:, None, :]  # the four blocks of a matrix over joints, shape (4, 3, 3)
 
 
 def jacobian_transpose_torques(
@@ -22,25 +24,20 @@ def jacobian_transpose_torques(
         tau_i = h_i - J_i' f_i  on the ground,    tau_i = h_i + M_i J_i^-1 (a_i - Jdot_i v)  in the air.
 
     Args:
-        dynamics: at the present state.
-        forces_w: of the ground on the feet, world [N], shape (4, 3); used only where `stance` is True.
-        stance: feet on the ground, bool, shape (4,).
-        swing_acceleration_w: world [m/s^2], shape (4, 3); used only where `stance` is False.
+        dynamics, forces_w, stance, swing_acceleration_w: as of `Request.of`.
 
     Returns:
         Joint torques [N m], shape (12,), clipped at the torque limits, and the joint accelerations [rad/s^2], shape
         (12,), that belong to the feet's accelerations (-10 v_foot on the ground) while the base does not accelerate.
     """
-    legs = np.arange(12).reshape(4, 3)
-    jacobian = dynamics.jacobian[legs[:, :, None], 6 + legs[:, None, :]]
-    mass = dynamics.mass_matrix[6 + legs[:, :, None], 6 + legs[:, None, :]]
-    foot = np.where(stance[:, None], -STANCE_DAMPING * dynamics.feet_velocity_w, swing_acceleration_w)
-    target = (foot - dynamics.drift)[..., None]
+    request = Request.of(dynamics, forces_w, stance, swing_acceleration_w)
+    jacobian = dynamics.jacobian[_ROWS, 6 + _COLUMNS]
+    mass = dynamics.mass_matrix[6 + _ROWS, 6 + _COLUMNS]
+    target = request.foot_target[..., None]
     try:
         acceleration = np.linalg.solve(jacobian, target)
     except np.linalg.LinAlgError:  # a leg stretched to the singular point
         acceleration = np.linalg.pinv(jacobian) @ target
-    push = jacobian.transpose(0, 2, 1) @ np.where(stance[:, None], forces_w, 0.0)[..., None]
+    push = jacobian.transpose(0, 2, 1) @ request.force_w.reshape(4, 3, 1)
     effort = np.where(stance[:, None, None], -push, mass @ acceleration)
-    torque = dynamics.bias[6:] + effort.ravel()
-    return np.clip(torque, -robot.TORQUE_LIMIT, robot.TORQUE_LIMIT), acceleration.ravel()
+    return within_limits(dynamics.bias[6:] + effort.ravel()), acceleration.ravel()

@@ -8,7 +8,7 @@ given up where it matters least. With M, h, J of `Dynamics` the equations of mot
 hold for every choice of torques tau and ground forces f, so the accelerations vdot are no free variables but
 vdot = M^-1 (S' tau + J' f - h), and the dynamics of the base (the upper six rows of (1)) are met exactly. The program
 
-    minimise    |vdot_base - vdot_base*|^2_base + |J vdot + Jdot v - a_foot*|^2_feet + |f - f*|^2_force
+    minimize    |vdot_base - vdot_base*|^2_base + |J vdot + Jdot v - a_foot*|^2_feet + |f - f*|^2_force
     subject to  |tau| <= tau_max,  |f_x| <= mu f_z,  |f_y| <= mu f_z,  f_z >= 0 on the ground,  f = 0 in the air
 
 (the weighted form of A. Herzog et al., Autonomous Robots 40, 2016; D. Kim et al., arXiv 1909.06586, take the MPC's
@@ -18,20 +18,25 @@ within the limits it is the optimum, and no program is solved.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import osqp
 from scipy import sparse
 
-from experts.plausibility import LARGEST
+from experts.friction import ROWS_PER_FOOT, friction_pyramid
+from experts.plausibility import plausible
 from experts.robot_model import Dynamics
-from experts.whole_body.inverse_dynamics import STANCE_DAMPING, joint_torques
+from experts.whole_body.inverse_dynamics import equations, joint_torques, required_torque
+from experts.whole_body.request import Request, within_limits
 from go1_mtl_gym import robot
 from go1_mtl_gym.validation import number_in
 
 _TORQUE_UNIT, _FORCE_UNIT = 10.0, 40.0
 _UNIT = np.repeat([_TORQUE_UNIT, _FORCE_UNIT], 12)  # of the program's variables [tau, f]: N m and N
-_N = 24
+_N = 24  # variables
+_NV = 18  # generalized velocities
+_LIMITS = 12 + 4 * ROWS_PER_FOOT  # rows: the torques, then each foot's pyramid
 
 
 @dataclass(frozen=True)
@@ -51,7 +56,7 @@ class WholeBodyConfig:
         max_iterations: of OSQP; a program that needs more is answered in closed form.
 
     Raises:
-        InvalidInputError: if a figure is outside its range.
+        InvalidInputError: if a number is outside its range.
     """
 
     linear_weight: float = 1.0
@@ -77,7 +82,7 @@ class WholeBodyConfig:
 
 @dataclass(frozen=True)
 class WholeBodyProgram:
-    """One problem in y = [tau / 10 N m, f / 40 N]: minimise y' P y / 2 + q' y subject to l <= A y <= u, A constant.
+    """One problem in y = [tau / 10 N m, f / 40 N]: minimize y' P y / 2 + q' y subject to l <= A y <= u, A constant.
 
     Attributes:
         P: Hessian, shape (24, 24).
@@ -90,7 +95,7 @@ class WholeBodyProgram:
 
     P: np.ndarray
     q: np.ndarray
-    l: np.ndarray  # noqa: E741 (the field's letter)
+    l: np.ndarray
     u: np.ndarray
     start: np.ndarray
     response: np.ndarray
@@ -100,7 +105,8 @@ class WholeBodyProgram:
 class WholeBodyQP:
     """Solves `WholeBodyProgram`s in one OSQP workspace that is set up once and only updated afterwards.
 
-    Each solve starts from the closed form with zero multipliers, so an answer depends on the arguments alone.
+    Each solve starts from the closed form with zero multipliers, so an answer depends on the arguments alone. A copy,
+    deep or pickled, gets a new workspace and keeps the counts.
 
     Args:
         config: weights, limits and solver settings.
@@ -114,32 +120,20 @@ class WholeBodyQP:
     def __init__(self, config: WholeBodyConfig | None = None) -> None:
         self.config = config or WholeBodyConfig()
         self.solves = self.failures = 0
-        mu = self.config.friction
-        pyramid = np.array([[1.0, 0, mu], [-1.0, 0, mu], [0, 1.0, mu], [0, -1.0, mu], [0, 0, 1.0]])
-        self.A = np.zeros((32, _N))
+        self.A = np.zeros((_LIMITS, _N))
         self.A[:12, :12] = np.eye(12)
-        self.A[12:, 12:] = np.kron(np.eye(4), pyramid)
+        self.A[12:, 12:] = np.kron(np.eye(4), friction_pyramid(self.config.friction))
         self._torque_limit = robot.TORQUE_LIMIT / _TORQUE_UNIT
-        self._multipliers = np.zeros(32)
+        self._no_multipliers = np.zeros(_LIMITS)
         self._upper = np.tril_indices(_N)  # of the transpose: the upper triangle column by column, as CSC wants it
-        self._solver = osqp.OSQP()
-        self._solver.setup(
-            sparse.csc_matrix(np.triu(np.ones((_N, _N)))),
-            np.zeros(_N),
-            sparse.csc_matrix(self.A),
-            np.full(32, -1.0),
-            np.full(32, np.inf),
-            verbose=False,
-            scaling=0,
-            adaptive_rho=0,
-            rho=self.config.rho,
-            eps_abs=self.config.tolerance,
-            eps_rel=0.0,
-            max_iter=self.config.max_iterations,
-            check_termination=10,
-            polishing=False,
-            warm_starting=True,
-        )
+        self._solver = self._set_up()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "_solver"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._solver = self._set_up()
 
     def torques(
         self, dynamics: Dynamics, forces_w: np.ndarray, stance: np.ndarray, swing_acceleration_w: np.ndarray
@@ -147,10 +141,7 @@ class WholeBodyQP:
         """Torques within the limits that come closest to what is asked for.
 
         Args:
-            dynamics: at the present state.
-            forces_w: of the ground on the feet, world [N], shape (4, 3); used only where `stance` is True.
-            stance: feet on the ground, bool, shape (4,).
-            swing_acceleration_w: world [m/s^2], shape (4, 3); used only where `stance` is False.
+            dynamics, forces_w, stance, swing_acceleration_w: as of `Request.of`.
 
         Returns:
             Joint torques [N m], shape (12,), and the joint accelerations [rad/s^2], shape (12,), that they give.
@@ -168,53 +159,82 @@ class WholeBodyQP:
         if y is None:
             self.failures += 1
             return closed
-        torque = np.clip(y[:12] * _TORQUE_UNIT, -robot.TORQUE_LIMIT, robot.TORQUE_LIMIT)
+        torque = within_limits(y[:12] * _TORQUE_UNIT)
         y[:12] = torque / _TORQUE_UNIT
         return torque, program.response[6:] @ y + program.free[6:]
 
     def program(
         self, dynamics: Dynamics, forces_w: np.ndarray, stance: np.ndarray, swing_acceleration_w: np.ndarray
     ) -> WholeBodyProgram:
-        """The program of a call of `torques`, as data."""
-        config = self.config
-        force = np.where(stance[:, None], forces_w, 0.0).ravel()
-        foot = np.where(stance[:, None], -STANCE_DAMPING * dynamics.feet_velocity_w, swing_acceleration_w)
-        torque, base = _without_limits(dynamics, force, foot)
-        sides = np.zeros((18, _N + 1))
-        sides[6:, :12] = np.eye(12) * _TORQUE_UNIT
-        sides[:, 12:_N] = dynamics.jacobian.T * (np.repeat(stance, 3) * _FORCE_UNIT)
-        sides[:, _N] = -dynamics.bias
-        motion = np.linalg.solve(dynamics.mass_matrix, sides)  # vdot per variable, and at zero
+        """The program of a call of `torques`, as data.
 
-        weight = np.empty(18)
+        Raises:
+            numpy.linalg.LinAlgError: if the closed form is singular: a leg stretched to the end.
+        """
+        config = self.config
+        request = Request.of(dynamics, forces_w, stance, swing_acceleration_w)
+        closed = np.linalg.solve(*equations(request))
+        start = np.concatenate([required_torque(request, closed), request.force_w]) / _UNIT
+        motion = _motion(request)
+
+        # The least-squares terms of base and feet: what each variable does to them, and what is left to be done.
+        effect = np.concatenate([motion[:6], dynamics.jacobian @ motion])
+        target = np.concatenate([closed[:6], request.foot_target.ravel()]) - effect[:, _N]
+        weighted = self._weight(stance)[:, None] * effect[:, :_N]
+        P = effect[:, :_N].T @ weighted
+        q = -target @ weighted
+        # The forces are variables themselves, so their term is diagonal.
+        P.flat[12 * (_N + 1) :: _N + 1] += config.force_weight * _FORCE_UNIT**2
+        q[12:] -= config.force_weight * _FORCE_UNIT * request.force_w
+        return WholeBodyProgram(P, q, *self._bounds(stance), start, motion[:, :_N], motion[:, _N])
+
+    def _weight(self, stance: np.ndarray) -> np.ndarray:
+        """Weights of the base's accelerations, then of the feet's, shape (18,)."""
+        config, weight = self.config, np.empty(_NV)
         weight[:3], weight[3:6] = config.linear_weight, config.angular_weight
         weight[6:] = np.repeat(np.where(stance, config.stance_weight, config.swing_weight), 3)
-        effect = np.concatenate([motion[:6], dynamics.jacobian @ motion])
-        wanted = np.concatenate([base, (foot - dynamics.drift).ravel()]) - effect[:, _N]
-        weighted = weight[:, None] * effect[:, :_N]
-        P = effect[:, :_N].T @ weighted
-        q = -wanted @ weighted
-        P.flat[12 * (_N + 1) :: _N + 1] += config.force_weight * _FORCE_UNIT**2
-        q[12:] -= config.force_weight * _FORCE_UNIT * force
+        return weight
 
-        l = np.empty(32)
-        l[:12] = -self._torque_limit
-        l[12:] = np.where(np.repeat(stance, 5), -config.slack / _FORCE_UNIT, -np.inf)
-        u = np.full(32, np.inf)
-        u[:12] = self._torque_limit
-        return WholeBodyProgram(P, q, l, u, np.concatenate([torque, force]) / _UNIT, motion[:, :_N], motion[:, _N])
+    def _bounds(self, stance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """l and u. A foot in the air needs no bounds: its force moves nothing, and its weight draws it to zero."""
+        l, u = np.empty(_LIMITS), np.full(_LIMITS, np.inf)
+        l[:12], u[:12] = -self._torque_limit, self._torque_limit
+        l[12:] = np.where(np.repeat(stance, ROWS_PER_FOOT), -self.config.slack / _FORCE_UNIT, -np.inf)
+        return l, u
 
     def _solve(self, program: WholeBodyProgram) -> np.ndarray | None:
-        parts = (program.P, program.q, program.start)
-        if not all((np.abs(part) < LARGEST).all() for part in parts):
+        """The solution y, shape (24,), or None."""
+        if not plausible(program.P, program.q, program.start):
             return None
         start = program.start.copy()
         start[:12] = np.clip(start[:12], -self._torque_limit, self._torque_limit)
         self._solver.update(q=program.q, l=program.l, u=program.u, Px=program.P[self._upper])
-        self._solver.warm_start(x=start, y=self._multipliers)
+        self._solver.warm_start(x=start, y=self._no_multipliers)
         result = self._solver.solve(raise_error=False)
         solved = result.info.status_val == osqp.SolverStatus.OSQP_SOLVED and np.isfinite(result.x).all()
         return result.x.copy() if solved else None
+
+    def _set_up(self) -> osqp.OSQP:
+        """A workspace of the program's pattern; its numbers come with each update."""
+        solver = osqp.OSQP()
+        solver.setup(
+            sparse.csc_matrix(np.triu(np.ones((_N, _N)))),
+            np.zeros(_N),
+            sparse.csc_matrix(self.A),
+            np.full(_LIMITS, -1.0),
+            np.full(_LIMITS, np.inf),
+            verbose=False,
+            scaling=0,
+            adaptive_rho=0,
+            rho=self.config.rho,
+            eps_abs=self.config.tolerance,
+            eps_rel=0.0,
+            max_iter=self.config.max_iterations,
+            check_termination=10,
+            polishing=False,
+            warm_starting=True,
+        )
+        return solver
 
     def _pushes(self, forces_w: np.ndarray) -> bool:
         """Whether forces (..., 3) lie in the pyramid."""
@@ -222,11 +242,11 @@ class WholeBodyQP:
         return bool((room >= -self.config.slack).all() and (forces_w[:, 2] >= -self.config.slack).all())
 
 
-def _without_limits(dynamics: Dynamics, force: np.ndarray, foot: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Torques, shape (12,), and base accelerations, shape (6,), of the closed form, not clipped."""
-    generalised = dynamics.jacobian.T @ force
-    system = np.concatenate([dynamics.mass_matrix[:6], dynamics.jacobian])
-    target = np.concatenate([generalised[:6] - dynamics.bias[:6], (foot - dynamics.drift).ravel()])
-    vdot = np.linalg.solve(system, target)
-    torque = (dynamics.mass_matrix @ vdot + dynamics.bias - generalised)[6:]
-    return torque, vdot[:6]
+def _motion(request: Request) -> np.ndarray:
+    """Equation (1) solved for vdot: one column per variable of the program and a last one at zero, shape (18, 25)."""
+    dynamics = request.dynamics
+    sides = np.zeros((_NV, _N + 1))
+    sides[6:, :12] = np.eye(12) * _TORQUE_UNIT
+    sides[:, 12:_N] = dynamics.jacobian.T * (np.repeat(request.stance, 3) * _FORCE_UNIT)
+    sides[:, _N] = -dynamics.bias
+    return np.linalg.solve(dynamics.mass_matrix, sides)

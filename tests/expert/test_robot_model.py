@@ -1,4 +1,4 @@
-"""Pinocchio against MuJoCo on random states, and Jdot v against finite differences."""
+"""Pinocchio against MuJoCo on random states, Jdot v against finite differences, and the attitude of trunk and legs."""
 
 from dataclasses import replace
 
@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from experts.robot_model import Dynamics, RobotModel, to_pinocchio
+from experts.robot_model import Dynamics, RobotModel, to_pinocchio, whole_body_attitude
 from go1_mtl_gym import robot
 from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.sensing.state import RobotState
@@ -113,7 +113,7 @@ def test_standing_inertia_and_mass_are_the_published_ones(model):
 
 
 def moved(model: RobotModel, state: RobotState, seconds: float) -> RobotState:
-    """The state after moving on with constant generalised velocity in the base frame (vdot = 0)."""
+    """The state after moving on with constant generalized velocity in the base frame (vdot = 0)."""
     q, v = to_pinocchio(state)
     q = pin.integrate(model.model, q, v * seconds)
     quat = q[[6, 3, 4, 5]]
@@ -177,3 +177,35 @@ def test_evaluations_do_not_share_memory_with_the_model(model, env):
     model.dynamics(random_state(env, rng))
     for name, value in kept.items():
         np.testing.assert_array_equal(getattr(first, name), value)
+
+
+def attitude(model, state) -> np.ndarray:
+    return whole_body_attitude(state, model.dynamics(state))
+
+
+def test_in_the_home_pose_the_whole_has_the_trunks_attitude(model, standing):
+    tilted = replace(standing, quat_wxyz=np.array([0.9, 0.1, -0.2, 0.3]) / np.sqrt(0.95))
+    np.testing.assert_allclose(attitude(model, tilted), tilted.rpy, atol=1e-12)
+    assert np.abs(tilted.rpy).min() > 0.05
+
+
+def test_legs_swung_forward_turn_the_whole_back(model, standing):
+    """Hind thighs and fore thighs turn about +y when the feet go back; by hand, lean = I^-1 A dq is positive then."""
+    back = replace(standing, q=robot.HOME_POSE + np.tile([0.0, 0.1, 0.0], 4))
+    forward = replace(standing, q=robot.HOME_POSE - np.tile([0.0, 0.1, 0.0], 4))
+    for state, sign in ((back, 1.0), (forward, -1.0)):
+        roll, pitch, yaw = attitude(model, state) - state.rpy
+        assert 0.005 < sign * pitch < 0.1
+        assert abs(roll) < 1e-3 and abs(yaw) < 1e-3
+
+
+def test_the_rate_of_its_attitude_is_the_mean_angular_velocity(model, standing):
+    """With a level trunk that rests; in the heading frame, whichever way the robot faces."""
+    step = 1e-6
+    speed = np.random.default_rng(0).normal(size=12)
+    for yaw in (0.0, 2.0):
+        facing = replace(standing, quat_wxyz=np.array([np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)]), v=speed)
+        ahead, behind = (attitude(model, replace(facing, q=robot.HOME_POSE + t * speed)) for t in (step, -step))
+        x, y, z = model.dynamics(replace(facing, q=robot.HOME_POSE)).mean_omega_w
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        np.testing.assert_allclose((ahead - behind) / (2 * step), [cos * x + sin * y, cos * y - sin * x, z], atol=1e-6)

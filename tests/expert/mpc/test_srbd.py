@@ -22,7 +22,7 @@ def at_point(dt: float, x: np.ndarray = POINT, u: np.ndarray = INPUT) -> LinearM
 def cross_matrix(r: np.ndarray) -> np.ndarray:
     """[r] with [r] f = r x f, shape (3, 3)."""
     out = np.empty((3, 3))
-    _cross(r, out, 1.0)
+    _cross(*r, out, 0)
     return out
 
 
@@ -36,7 +36,7 @@ def rotation_matrix(rpy: np.ndarray) -> np.ndarray:
 def euler_rate_matrix(rpy: np.ndarray) -> np.ndarray:
     """E of the model's equation (1), shape (3, 3)."""
     E, W = np.empty((3, 3)), np.empty((3, 3))
-    _euler_rates(rpy, np.zeros(3), E, W)
+    _euler_rates(np.r_[rpy, np.zeros(9)], E, W)
     return E
 
 
@@ -116,7 +116,7 @@ def test_the_affine_model_agrees_with_the_nonlinear_one_at_the_point():
     np.testing.assert_allclose(A @ POINT + B @ INPUT + c, nonlinear(POINT, INPUT), atol=2e-4)
 
 
-def test_discretisation_is_of_second_order():
+def test_discretization_is_of_second_order():
     A, B, c = continuous()
     errors = []
     for dt in (0.04, 0.02, 0.01):

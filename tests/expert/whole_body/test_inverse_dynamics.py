@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from experts.robot_model import RobotModel
-from experts.whole_body.inverse_dynamics import STANCE_DAMPING, joint_torques
+from experts.whole_body.inverse_dynamics import joint_torques
+from experts.whole_body.request import STANCE_DAMPING
 from go1_mtl_gym import robot
 
 STANCES = [(True,) * 4, (True, False, False, True), (True, True, True, False), (False,) * 4]

@@ -7,9 +7,10 @@ import pytest
 from scipy.optimize import nnls
 
 from experts.robot_model import Dynamics, RobotModel
-from experts.whole_body.inverse_dynamics import STANCE_DAMPING, joint_torques
+from experts.whole_body.inverse_dynamics import equations, joint_torques
 from experts.whole_body.jacobian_transpose import jacobian_transpose_torques
-from experts.whole_body.qp import WholeBodyConfig, WholeBodyQP, _without_limits
+from experts.whole_body.qp import WholeBodyConfig, WholeBodyQP
+from experts.whole_body.request import STANCE_DAMPING, Request
 from go1_mtl_gym import robot
 from go1_mtl_gym.errors import InvalidInputError
 
@@ -58,7 +59,7 @@ def exact(qp: WholeBodyQP, call: tuple) -> np.ndarray:
     return np.linalg.solve(root.T, -residual[:24] / residual[24] * unit - offset) * UNIT
 
 
-def realised(dynamics: Dynamics, torque: np.ndarray, stance: np.ndarray) -> np.ndarray:
+def achieved(dynamics: Dynamics, torque: np.ndarray, stance: np.ndarray) -> np.ndarray:
     """Base acceleration, shape (6,), that torques give while feet in stance slow down as both laws assume.
 
     [M, -J'; J, 0] [vdot; f] = [S' tau - h; -10 v_foot - Jdot v].
@@ -128,15 +129,14 @@ def test_where_the_closed_form_clips_the_base_comes_closer_to_what_was_asked(mod
     qp, scale = WholeBodyQP(), np.sqrt([1, 1, 1, 0.1, 0.1, 0.1])
     errors = []
     for call in demands(model, driven.states, "force"):
-        dynamics, forces, stance, swing = call
+        dynamics, _, stance, _ = call
         clipped, _ = joint_torques(*call)
         if not stance.any() or (np.abs(clipped) < robot.TORQUE_LIMIT).all():
             continue
-        foot = np.where(stance[:, None], -STANCE_DAMPING * dynamics.feet_velocity_w, swing)
-        _, wanted = _without_limits(dynamics, np.where(stance[:, None], forces, 0.0).ravel(), foot)
+        wanted = np.linalg.solve(*equations(Request.of(*call)))[:6]
         torque, _ = qp.torques(*call)
         assert (np.abs(torque) <= robot.TORQUE_LIMIT).all()
-        errors.append([np.linalg.norm(scale * (realised(dynamics, t, stance) - wanted)) for t in (torque, clipped)])
+        errors.append([np.linalg.norm(scale * (achieved(dynamics, t, stance) - wanted)) for t in (torque, clipped)])
     assert errors
     ours, theirs = np.mean(errors, axis=0)
     assert ours < theirs

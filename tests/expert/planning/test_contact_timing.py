@@ -1,50 +1,12 @@
-"""The attitude of trunk and legs together, and the pieces of a hold between contact changes."""
+"""The pieces of a hold between contact changes."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from experts.nmpc import SHORTEST_PIECE_S, contact_pieces, whole_body_attitude
-from experts.robot_model import RobotModel
-from go1_mtl_gym import GAITS, robot
-
-
-@pytest.fixture(scope="module")
-def model() -> RobotModel:
-    return RobotModel()
-
-
-def attitude(model, state) -> np.ndarray:
-    return whole_body_attitude(state, model.dynamics(state))
-
-
-def test_in_the_home_pose_it_is_the_trunks(model, standing):
-    tilted = replace(standing, quat_wxyz=np.array([0.9, 0.1, -0.2, 0.3]) / np.sqrt(0.95))
-    np.testing.assert_allclose(attitude(model, tilted), tilted.rpy, atol=1e-12)
-    assert np.abs(tilted.rpy).min() > 0.05
-
-
-def test_legs_swung_forward_turn_the_whole_back(model, standing):
-    """Hind thighs and fore thighs turn about +y when the feet go back; by hand, lean = I^-1 A dq is positive then."""
-    back = replace(standing, q=robot.HOME_POSE + np.tile([0.0, 0.1, 0.0], 4))
-    forward = replace(standing, q=robot.HOME_POSE - np.tile([0.0, 0.1, 0.0], 4))
-    for state, sign in ((back, 1.0), (forward, -1.0)):
-        roll, pitch, yaw = attitude(model, state) - state.rpy
-        assert 0.005 < sign * pitch < 0.1
-        assert abs(roll) < 1e-3 and abs(yaw) < 1e-3
-
-
-def test_its_rate_is_the_mean_angular_velocity(model, standing):
-    """With a level trunk that rests; in the heading frame, whichever way the robot faces."""
-    step = 1e-6
-    speed = np.random.default_rng(0).normal(size=12)
-    for yaw in (0.0, 2.0):
-        facing = replace(standing, quat_wxyz=np.array([np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)]), v=speed)
-        ahead, behind = (attitude(model, replace(facing, q=robot.HOME_POSE + t * speed)) for t in (step, -step))
-        x, y, z = model.dynamics(replace(facing, q=robot.HOME_POSE)).mean_omega_w
-        cos, sin = np.cos(yaw), np.sin(yaw)
-        np.testing.assert_allclose((ahead - behind) / (2 * step), [cos * x + sin * y, cos * y - sin * x, z], atol=1e-6)
+from experts.planning.contact_timing import SHORTEST_PIECE_S, contact_pieces
+from go1_mtl_gym import GAITS
 
 
 def pieces(standing, gait: str, phase: float, hold_s: float) -> list:
