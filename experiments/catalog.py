@@ -6,6 +6,15 @@ from experiments.study import Study
 from go1_mtl_gym.validation import one_of
 
 STUDIES = {
+    "expert_commands": "experiments.expert.commands:Commands",
+    "expert_limits": "experiments.expert.limits:Limits",
+    "expert_pushes": "experiments.expert.limits:Pushes",
+    "expert_steady": "experiments.expert.steady:Steady",
+    "expert_transitions": "experiments.expert.transitions:Transitions",
+    "expert_labels": "experiments.expert.labels:Labels",
+    "expert_settings": "experiments.expert.timing:Settings",
+    "expert_timing": "experiments.expert.timing:Timing",
+    "expert_long_walk": "experiments.expert.transitions:LongWalk",
     "student_commanded": "experiments.student.commanded:Commanded",
     "student_transitions": "experiments.student.transitions:Transitions",
     "student_robustness": "experiments.student.robustness:Robustness",

@@ -7,6 +7,7 @@ import argparse
 import shlex
 import shutil
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 
 from experiments import main_job
@@ -35,15 +36,22 @@ class Page:
         title: of the page.
         studies: beginning of their names.
         about: a sentence below the title.
+        lead: module and function of paragraphs above the studies, made of {study: results}; empty for none.
     """
 
     title: str
     studies: str
     about: str
+    lead: str = ""
+
+    def leading(self, measured: dict[str, Results]) -> list[str]:
+        """The paragraphs above the studies."""
+        module, _, function = self.lead.partition(":")
+        return getattr(import_module(module), function)(measured) if module else []
 
 
 PAGES = {
-    "expert": Page("The expert", "expert_", "The MPC expert alone, gait by gait."),
+    "expert": Page("The expert", "expert_", "The MPC expert alone, gait by gait.", "experiments.expert.card:card"),
     "student": Page(
         "The student", "student_", "Policies beside the expert, each in the environment that it was made for."
     ),
@@ -67,14 +75,16 @@ PAGES = {
 
 def page(name: str, folder: Path) -> str | None:
     """The text of a page; None if nothing of it was measured."""
-    about = PAGES[name]
-    parts, measured = [f"# {about.title}", GENERATED, about.about], []
+    about, measured, sections = PAGES[name], {}, []
     for study in (each for each in STUDIES if each.startswith(about.studies)):
         path = folder / f"{study}.json"
         if path.is_file():
-            measured.append(Results.read(path))
-            parts += section(study, measured[-1], path.with_suffix(".png").is_file())
-    return "\n\n".join([*parts, *how_it_was_made(measured)]) + "\n" if measured else None
+            measured[study] = Results.read(path)
+            sections += section(study, measured[study], path.with_suffix(".png").is_file())
+    if not measured:
+        return None
+    lead = [f"# {about.title}", GENERATED, about.about, *about.leading(measured)]
+    return "\n\n".join([*lead, *sections, *how_it_was_made([*measured.values()])]) + "\n"
 
 
 def section(name: str, results: Results, picture: bool) -> list[str]:
