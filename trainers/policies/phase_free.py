@@ -10,8 +10,8 @@ from stable_baselines3.common.policies import BasePolicy
 from tqdm.auto import tqdm
 
 from go1_mtl_gym import TASKS
-from go1_mtl_gym.clock import STAND_COMMAND
 from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.gaits import STAND_COMMAND
 from go1_mtl_gym.sensing.observation import ObservationLayout
 from go1_mtl_gym.validation import one_of
 from trainers.data.collection import EPISODE_S, watch
