@@ -8,6 +8,7 @@ import numpy as np
 
 from go1_mtl_gym.errors import Go1Error
 from go1_mtl_gym.robot import FOOT_RADIUS
+from go1_mtl_gym.rotations import yaw_matrix
 from go1_mtl_gym.sensing.state import RobotState
 from go1_mtl_gym.sim.simulation import Simulation
 
@@ -29,8 +30,7 @@ def annotate(scene: mujoco.MjvScene, simulation: Simulation, state: RobotState) 
         if contact:
             size = [2.2 * FOOT_RADIUS, 2.2 * FOOT_RADIUS, 0.002]
             _add(scene, mujoco.mjtGeom.mjGEOM_ELLIPSOID, size, [*foot[:2], 0.003], CONTACT_COLOR)
-    yaw = state.rpy[2]
-    turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
+    turn = yaw_matrix(state.rpy[2])
     above = state.position_w + [0.0, 0.0, 0.22]
     for velocity, color, lift in (
         (state.command, COMMAND_COLOR, 0.03),

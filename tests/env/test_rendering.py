@@ -40,7 +40,11 @@ def test_pictures_follow_the_robot(env):
 @pytest.mark.gl
 def test_a_command_draws_a_green_arrow(env):
     before = env.render().astype(int)
-    env._episode.filtered_command[:] = [0.6, 0.0, 0.0]
+    snapshot = env.simulation.snapshot()
+    env.set_command((0.6, 0.0, 0.0))
+    for _ in range(30):
+        env.step(env.action_map.from_radians(robot.HOME_POSE))
+    env.simulation.restore(snapshot)
     after = env.render().astype(int)
     changed = (after != before).any(axis=2)
     assert 10 < changed.sum() < changed.size / 4
