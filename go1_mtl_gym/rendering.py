@@ -28,8 +28,8 @@ class RenderingError(Go1Error, RuntimeError):
 def choose_backend() -> None:
     """On Linux without a display, let MuJoCo draw by EGL, or by OSMesa where only that is installed.
 
-    MuJoCo reads the environment variable MUJOCO_GL once, when it is imported, and then takes GLFW if it is not set, which
-    needs a display. So the module that reads it is read again here, before the first picture. A choice that the user
+    MuJoCo reads the environment variable MUJOCO_GL once, when it is imported, and takes GLFW if it is not set, which
+    needs a display. So the module that reads it is loaded again here, before the first picture. A choice that the user
     has made stays, and child processes inherit ours.
     """
     if not sys.platform.startswith("linux") or "MUJOCO_GL" in os.environ or has_display():
