@@ -7,6 +7,7 @@ Importing the package registers ``Go1Trot-v0``, ``Go1Bound-v0``, ``Go1Jump-v0``,
 
 from importlib.metadata import PackageNotFoundError, version
 
+from go1_mtl_gym.contract import PolicyContract
 from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
 from go1_mtl_gym.gaits import GAITS, Gait
@@ -31,6 +32,7 @@ __all__ = [
     "InvalidInputError",
     "ObservationLayout",
     "PerturbationWrapper",
+    "PolicyContract",
     "RobotState",
     "SensorNoise",
     "StateEstimatorConfig",

@@ -12,6 +12,7 @@ from gymnasium.spaces import Box
 
 from go1_mtl_gym import arguments, robot
 from go1_mtl_gym.actuation import ActionMap, PDGains
+from go1_mtl_gym.contract import PolicyContract
 from go1_mtl_gym.episode import Episode
 from go1_mtl_gym.expert import DEFAULT_EXPERT, check_expert, load_expert
 from go1_mtl_gym.registration import register_task
@@ -195,6 +196,12 @@ class Go1Env(gymnasium.Env):
             self._renderer = None
 
     # -- What is particular to the Go1 -------------------------------------------------------------------------------
+
+    @property
+    def contract(self) -> PolicyContract:
+        """What gives the numbers of observations and actions here their meaning."""
+        gaits = [TASKS[name].gait for name in self.tasks]
+        return PolicyContract.of_environment(self.layout, gaits, self.control_hz, self.gains, self.action_map)
 
     @property
     def task(self) -> Task:

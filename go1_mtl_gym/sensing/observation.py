@@ -29,6 +29,10 @@ PROPRIOCEPTION = MappingProxyType({"accelerometer": 3, "gyroscope": 3, "q": 12, 
 """Sizes of the raw proprioceptive parts; together the 34 numbers of arXiv 2505.08574."""
 CHANNELS = MappingProxyType({"command": 3, "gravity": 3, "phase": 2, "last_action": 12})
 """Sizes of the parts that are there when asked for."""
+UNITS = MappingProxyType(
+    {"accelerometer": "m/s^2", "gyroscope": "rad/s", "q": "rad", "dq": "rad/s", "command": "m/s, m/s, rad/s"}
+)
+"""Units of the parts that have one."""
 FRAME_SIZE = sum(PROPRIOCEPTION.values())
 
 _BOUND = {
