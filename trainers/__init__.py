@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from trainers.evaluation.metrics import offline_metrics
     from trainers.evaluation.scoring import ClosedLoopResult, EpisodeRecord
     from trainers.evaluation.video import record_frames, save_gif, tile
+    from trainers.pipeline.config import JobConfig
+    from trainers.pipeline.job import Job
     from trainers.policies.checkpoint import CheckpointError, load
     from trainers.policies.expert_policy import ExpertPolicy
     from trainers.policies.multi_head import MultiHeadPolicy
@@ -47,6 +49,8 @@ _HOME = {
     "Demonstrations": "data.demonstrations",
     "EpisodeRecord": "evaluation.scoring",
     "ExpertPolicy": "policies.expert_policy",
+    "Job": "pipeline.job",
+    "JobConfig": "pipeline.config",
     "Learner": "policies.stateful",
     "MultiHeadPolicy": "policies.multi_head",
     "MultiTaskLoss": "algorithms.losses",
@@ -97,6 +101,8 @@ __all__ = [
     "Demonstrations",
     "EpisodeRecord",
     "ExpertPolicy",
+    "Job",
+    "JobConfig",
     "Learner",
     "MultiHeadPolicy",
     "MultiTaskLoss",
