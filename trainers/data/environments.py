@@ -11,6 +11,7 @@ import gymnasium
 import numpy as np
 
 import go1_mtl_gym
+from go1_mtl_gym.contract import PolicyContract
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
 from go1_mtl_gym.validation import interval_s, number_in
 from trainers.utils.processes import keep_interrupts
@@ -55,7 +56,12 @@ class PerturbationConfig:
 
 
 class ExpertAccess(gymnasium.Wrapper):
-    """Carries `expert_action` outward, so that ``venv.env_method("expert_action")`` finds it on every gymnasium."""
+    """Carries `expert_action` and `contract` outward, so that a vector environment finds them on every gymnasium."""
+
+    @property
+    def contract(self) -> PolicyContract:
+        """What gives observations and actions their meaning."""
+        return self.env.unwrapped.contract
 
     def expert_action(self) -> np.ndarray:
         """The expert's action at the present state, shape (12,)."""
@@ -118,6 +124,15 @@ def make_venv(
             "a worker process ended before it had made its environment; a script that makes environments with "
             'subproc=True must do so below `if __name__ == "__main__":`, because every worker imports it again'
         ) from None
+
+
+def contracts_of(venv: Any) -> tuple[PolicyContract, ...]:
+    """The different contracts of the environments in a stable-baselines3 vector environment; none if they have none."""
+    try:
+        contracts = venv.get_attr("contract")
+    except AttributeError:
+        return ()
+    return tuple(dict.fromkeys(contracts))
 
 
 @dataclasses.dataclass(frozen=True)

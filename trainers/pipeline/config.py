@@ -16,10 +16,10 @@ from go1_mtl_gym.tasks import check_task_names
 from go1_mtl_gym.validation import interval_s, number_in, one_of
 from trainers.algorithms.bc import BCConfig
 from trainers.algorithms.dagger import DAggerConfig
+from trainers.algorithms.phase_free import PhaseConfig
 from trainers.data.environments import PerturbationConfig
 from trainers.pipeline.presets import PRESETS
 from trainers.policies.normalization import MODES
-from trainers.policies.phase_estimator import PhaseConfig
 from trainers.utils.files import json_ready
 
 NOISE_RAD = 0.06

@@ -11,6 +11,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from trainers.algorithms.bc import train_bc
 from trainers.algorithms.dagger import DAggerTrainer
+from trainers.algorithms.phase_free import train_phase_free
 from trainers.data.collection import collect_all
 from trainers.data.demonstrations import Demonstrations
 from trainers.data.environments import make_venv
@@ -23,9 +24,9 @@ from trainers.pipeline.demonstrations import held_out_jobs, training_jobs
 from trainers.pipeline.new_policy import new_policy
 from trainers.pipeline.pictures import save_videos
 from trainers.pipeline.run_folder import RunFolder, read_json
-from trainers.policies.checkpoint import load, versions
+from trainers.policies.checkpoint import versions
+from trainers.policies.loading import load
 from trainers.policies.multi_head import MultiHeadPolicy
-from trainers.policies.phase_free import train_phase_free
 from trainers.utils.files import json_ready, write_json
 from trainers.utils.logging import log_figure, log_round, log_text, make_logger
 

@@ -27,11 +27,10 @@ def new_policy(config: JobConfig, env_kwargs: Mapping[str, Any], pooled: bool = 
     policy = MultiHeadPolicy(
         env.observation_space,
         env.action_space,
+        contract=env.unwrapped.contract,
         width=config.width,
-        n_tasks=len(config.tasks),
         pooled=pooled,
         normalization=config.normalization,
-        env_kwargs=dict(env_kwargs),
         seed=config.seed,
     )
     env.close()
