@@ -2,42 +2,25 @@
 
 import argparse
 import dataclasses
-import functools
 import shlex
 import sys
-from collections.abc import Callable
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from experiments.agents import policy_files
 from experiments.catalog import STUDIES, study_class
 from experiments.plots import save_figure
+from experiments.publish import publish_command
 from experiments.study import CACHE, Study, default_jobs, run, summary_line, with_options
-from go1_mtl_gym.errors import Go1Error
 from go1_mtl_gym.validation import number_in
+from trainers.utils import cli
 
 OUT = CACHE / "results"
 FOLDERS = ("--out", "--cache")
 """Options that say where files go on this machine."""
 CHECKOUTS = ("--go2-convex-mpc",)
 """Options whose value is a path of this machine."""
-
-
-def exit_status(main: Callable[[list[str] | None], int]) -> Callable[[list[str] | None], int]:
-    """A command that ends with a status: 2 and one line for bad input, 130 for Ctrl-C."""
-
-    @functools.wraps(main)
-    def guarded(arguments: list[str] | None = None) -> int:
-        try:
-            return main(arguments)
-        except Go1Error as error:
-            print(f"error: {error}", file=sys.stderr)
-            return 2
-        except KeyboardInterrupt:
-            print("\ninterrupted; what is finished is kept, the same command goes on from there", file=sys.stderr)
-            return 130
-
-    return guarded
 
 
 def without_folders(arguments: list[str]) -> str:
@@ -101,25 +84,28 @@ def study_of(name: str, options: argparse.Namespace) -> Study:
     return cls(chosen, policy_files(getattr(options, "policy", [])), options.cache)
 
 
-def run_command(name: str, arguments: list[str]) -> int:
+def run_command(name: str, arguments: list[str]) -> None:
     """``run``: measure a study, write its results and picture, print its table."""
     study_class(name)
     options = study_parser(name).parse_args(arguments)
     study = study_of(name, options)
-    results = run(study, options.seed, options.n_jobs, without_folders(["run", name, *arguments]), options.only)
+    command = without_folders(["run", name, *arguments])
+    try:
+        results = run(study, options.seed, options.n_jobs, command, options.only)
+    except KeyboardInterrupt as interrupt:
+        raise KeyboardInterrupt("what is finished is kept, the same command goes on from there") from interrupt
     path = options.out / f"{study.name}.json"
     results.write(path)
     print(f"\n{study.table(results)}\n\nresults: {path}")
     figure = study.figure(results)
     if figure is not None:
         print(f"picture: {save_figure(figure, path.with_suffix('.png'))}")
-    return 0
 
 
-@exit_status
-def main(arguments: list[str] | None = None) -> int:
+@cli.main
+def main(arguments: Sequence[str] | None = None) -> None:
     """Run from the command line; returns the exit status."""
-    arguments = sys.argv[1:] if arguments is None else arguments
+    arguments = list(sys.argv[1:] if arguments is None else arguments)
     parser = argparse.ArgumentParser(
         prog="python -m experiments", description="Measure, and publish what was measured."
     )
@@ -132,14 +118,12 @@ def main(arguments: list[str] | None = None) -> int:
     if options.command == "list":
         width = max(map(len, STUDIES))
         print("\n".join(f"{name:{width}}  {summary_line(study_class(name))}" for name in STUDIES))
-        return 0
-    if options.command == "publish":
-        from experiments.publish import publish_command
-
-        return publish_command(rest)
-    if not rest or rest[0].startswith("-"):
+    elif options.command == "publish":
+        publish_command(rest)
+    elif not rest or rest[0].startswith("-"):
         parser.error("run needs the name of a study; list names them all")
-    return run_command(rest[0], rest[1:])
+    else:
+        run_command(rest[0], rest[1:])
 
 
 if __name__ == "__main__":

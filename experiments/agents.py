@@ -8,7 +8,7 @@ from typing import Any
 
 import trainers
 from go1_mtl_gym import TASKS
-from go1_mtl_gym.conditions import EXPERTS_ALONE
+from go1_mtl_gym.env_config import EXPERT_ONLY
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.sim.physics_params import PhysicsParams
 from trainers.policies.pretrained import FOLDER
@@ -16,7 +16,7 @@ from trainers.policies.pretrained import FOLDER
 EXPERT, STUDENT, PHASE_FREE = "expert", "student", "phase-free student"
 SHARED = ("tasks", "control_hz", "kp", "kd")
 """Arguments of the policies' environments that the expert's has as well; the others shape what only policies see."""
-TRAINING_WORLD = ("randomization", "noise", *EXPERTS_ALONE, *(each.name for each in fields(PhysicsParams)))
+TRAINING_WORLD = ("randomization", "noise", *EXPERT_ONLY, *(each.name for each in fields(PhysicsParams)))
 """Arguments in which the environment that a policy was trained in may differ; all are measured in the model's world."""
 
 
@@ -94,7 +94,8 @@ class PolicyFile(Agent):
     def load(self) -> Any:
         """The policy, for an environment without the `TRAINING_WORLD`."""
         policy = trainers.load(self.path)
-        policy.env_kwargs = {name: value for name, value in policy.env_kwargs.items() if name not in TRAINING_WORLD}
+        extra = policy.extra_env_kwargs
+        policy.extra_env_kwargs = {name: value for name, value in extra.items() if name not in TRAINING_WORLD}
         return policy
 
 

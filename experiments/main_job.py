@@ -8,7 +8,8 @@ from experiments.stats import Group
 from experiments.tables import count, markdown, number
 from go1_mtl_gym import TASKS, env_id
 from go1_mtl_gym.errors import InvalidInputError
-from trainers.pipeline.config import PRESETS, JobConfig
+from trainers.pipeline.config import JobConfig
+from trainers.pipeline.presets import PRESETS
 from trainers.utils.report import paper_table, results_table
 
 NAME = "main_job"

@@ -197,8 +197,12 @@ def without_out(command: str) -> str:
     return shlex.join(kept)
 
 
-def publish_command(arguments: list[str], root: Path = ROOT) -> int:
-    """``publish``; returns the exit status."""
+def publish_command(arguments: list[str], root: Path = ROOT) -> None:
+    """``publish``: write what is out of date.
+
+    Raises:
+        InvalidInputError: if something is out of date and is only to be checked.
+    """
     about = "Write docs/results/ and the summary of README.md from the results files."
     parser = argparse.ArgumentParser(prog="python -m experiments publish", description=about)
     parser.add_argument("run", type=Path, nargs="?", help="output folder of a finished main job, copied first")
@@ -210,10 +214,8 @@ def publish_command(arguments: list[str], root: Path = ROOT) -> int:
     wanted = texts(root)
     stale = [path for path, text in wanted.items() if not path.is_file() or path.read_text(encoding="utf-8") != text]
     names = ", ".join(str(path.relative_to(root)) for path in stale)
-    if options.check:
-        print(f"out of date: {names}" if stale else "up to date")
-        return int(bool(stale))
+    if options.check and stale:
+        raise InvalidInputError(f"out of date: {names}; python -m experiments publish writes them")
     for path in stale:
         write_atomically(path, lambda file, path=path: file.write(wanted[path].encode()))
-    print(f"wrote {names}" if stale else "nothing to change")
-    return 0
+    print(f"wrote {names}" if stale else "up to date")

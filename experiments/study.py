@@ -29,6 +29,7 @@ from trainers.algorithms.optimizer import torch_threads
 from trainers.data.environments import WithTasks
 from trainers.policies.checkpoint import versions
 from trainers.utils.files import json_ready, write_json
+from trainers.utils.processes import keep_interrupts
 
 CACHE = Path("runs/experiments")
 """Where finished cells, demonstrations and policies are kept."""
@@ -253,7 +254,8 @@ def _side_by_side(calls: Sequence[Any], n_jobs: int, title: str) -> list[Any]:
         results = (call() for call in calls)
     else:
         parallel = joblib.Parallel(n_jobs=n_jobs, return_as="generator")
-        results = parallel(joblib.delayed(WithTasks(call))() for call in calls)
+        with keep_interrupts():
+            results = parallel(joblib.delayed(WithTasks(call))() for call in calls)
     return list(tqdm(results, title, len(calls), unit="cell", disable=None if calls else True))
 
 

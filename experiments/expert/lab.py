@@ -1,4 +1,4 @@
-"""What the expert is measured in: one environment, an expert whose every answer is counted, and the frame of a study."""
+"""What the expert is measured in: one environment, an expert whose every answer is counted; and its studies' frame."""
 
 import dataclasses
 from abc import abstractmethod

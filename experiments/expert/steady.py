@@ -15,7 +15,7 @@ from experiments.results import Record, Results
 from experiments.tables import markdown, number
 from go1_mtl_gym import TASKS, Gait, robot
 from go1_mtl_gym.actuation import PHYSICS_HZ
-from go1_mtl_gym.clock import next_phase
+from go1_mtl_gym.gaits import next_phase
 
 SATURATED = 0.999
 """A joint is at its limit from this fraction of it."""
@@ -191,7 +191,7 @@ def contact_metrics(contacts: np.ndarray, phase: np.ndarray, gait: Gait) -> dict
 
     Returns:
         "contact_agreement", the fraction of (leg, sample) in which contact is as planned; "touchdown_lag_s" and
-        "liftoff_lag_s", medians of measured minus planned time [s]; "flight_fraction", the fraction of samples with no foot
+        "liftoff_lag_s", medians of measured minus planned time [s]; "flight_fraction", that of samples with no foot
         on the ground, and "planned_flight_fraction".
     """
     planned = gait.stance(phase)

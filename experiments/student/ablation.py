@@ -17,7 +17,8 @@ from experiments.student.transitions import TransitionOptions, transition
 from experiments.study import Cell, Metrics, Study
 from experiments.tables import count, markdown, number, settings
 from experiments.training_runs import TrainedPolicy, TrainingRun, changed
-from trainers.pipeline.config import PRESETS, JobConfig
+from trainers.pipeline.config import JobConfig
+from trainers.pipeline.presets import PRESETS
 
 CHANGED, HELD_OUT = "changed world", "held out"
 """Drawn commands in another world than the model's, and one-step errors on rows of the policy's own demonstrations."""

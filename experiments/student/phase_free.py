@@ -19,6 +19,7 @@ from experiments.student.phase import (
     ask_for_phase,
     asked_phase,
     phase_error,
+    phase_of,
     running_phase,
     with_correction,
     without_asked,
@@ -193,7 +194,7 @@ class PhaseFree(Study):
             episodes, estimate = options.given_episodes, running_phase(policy)
         records = walk(policy, options, episodes, seed)
         if estimate is not None:
-            error = phase_error(estimate, rows_of(options.held_out, self.folder), options.layout)
+            error = phase_error(estimate, rows_of(options.held_out, self.folder))
             records.append({"condition": PHASE_ERROR, **error})
         return records
 
@@ -301,12 +302,12 @@ class Trainings:
         return kept_policy(self.folder / f"{name.replace(',', '').replace(' ', '-')}.zip", train)
 
     def _one_network(self, variant: Variant) -> trainers.MultiHeadPolicy:
-        layout, rows = self.options.layout, rows_of(self.options.training, self.folder)
+        rows = rows_of(self.options.training, self.folder)
         job = replace(self.options.job, channels=variant.channels, history=variant.history)
         policy = new_policy(job, job.env_kwargs)
-        seen = rows.select(layout, ObservationLayout(job.tasks, job.channels, job.history))
+        seen = rows.select(job.channels, job.history)
         if variant.asked:
-            policy, seen = ask_for_phase(policy, seen, rows.obs[:, layout.slices["phase"]])
+            policy, seen = ask_for_phase(policy, seen, phase_of(rows))
         trainers.train_bc(policy, seen, job.bc)
         return policy
 
@@ -315,5 +316,5 @@ class Trainings:
         policy = self._kept("clock", lambda: self._one_network(VARIANTS["clock"]))
         estimator = trainers.PhaseEstimator(phase_free_layout(policy, history), job.width, job.seed)
         phase = trainers.PhaseConfig(job.clone_steps, job.batch_size, seed=job.seed)
-        trainers.train_phase(estimator, rows_of(self.options.training, self.folder), self.options.layout, phase)
+        trainers.train_phase(estimator, rows_of(self.options.training, self.folder), phase)
         return trainers.PhaseFreePolicy(policy, estimator)
