@@ -22,6 +22,7 @@ STUDIES = {
     "student_ablation": "experiments.student.ablation:Ablation",
     "student_budget": "experiments.student.budget:Budget",
     "student_phase_free": "experiments.student.phase_free:PhaseFree",
+    "new_gaits": "experiments.new_gaits.study:NewGaits",
 }
 """Name -> module and class."""
 
