@@ -12,6 +12,7 @@ from experiments.agents import policy_files
 from experiments.catalog import STUDIES, study_class
 from experiments.plots import save_figure
 from experiments.publish import publish_command
+from experiments.results import Results
 from experiments.study import CACHE, Study, default_jobs, run, summary_line, with_options
 from go1_mtl_gym.validation import number_in
 from trainers.utils import cli
@@ -48,6 +49,7 @@ def study_parser(name: str) -> argparse.ArgumentParser:
     add("--seed", type=int, default=1, help="of commands, resets, noise and pushes")
     add("--n-jobs", type=int, default=default_jobs(), help="processes")
     add("--only", nargs="+", default=[], help="agents, tasks and conditions; all if not given")
+    add("--add", action="store_true", help="keep records of the results file that this run does not replace")
     add("--out", type=Path, default=OUT, help="folder of the results and the picture")
     add("--cache", type=Path, default=CACHE, help="folder of finished cells, from which an interrupted run goes on")
     if cls.takes_policies:
@@ -95,11 +97,14 @@ def run_command(name: str, arguments: list[str]) -> None:
     except KeyboardInterrupt as interrupt:
         raise KeyboardInterrupt("what is finished is kept, the same command goes on from there") from interrupt
     path = options.out / f"{study.name}.json"
+    if options.add and path.is_file():
+        results = results.beside(Results.read(path), study.keys)
     results.write(path)
     print(f"\n{study.table(results)}\n\nresults: {path}")
-    figure = study.figure(results)
-    if figure is not None:
-        print(f"picture: {save_figure(figure, path.with_suffix('.png'))}")
+    figures = study.more_figures() | {"": study.figure(results)}
+    for end, figure in figures.items():
+        if figure is not None:
+            print(f"picture: {save_figure(figure, path.with_name(f'{study.name}{end}.png'))}")
 
 
 @cli.main

@@ -22,6 +22,10 @@ STUDIES = {
     "student_ablation": "experiments.student.ablation:Ablation",
     "student_budget": "experiments.student.budget:Budget",
     "student_phase_free": "experiments.student.phase_free:PhaseFree",
+    "paper_simulation": "experiments.paper.study:Simulation",
+    "paper_hardware": "experiments.paper.study:Hardware",
+    "paper_hardware_half_noise": "experiments.paper.study:HalfNoise",
+    "paper_hardware_estimator": "experiments.paper.study:Estimator",
     "new_gaits": "experiments.new_gaits.study:NewGaits",
 }
 """Name -> module and class."""

@@ -62,6 +62,7 @@ PAGES = {
         "The tables of arXiv 2505.08574, and ours beside them. All metrics are one-step errors of the joint targets on "
         "states that the expert visited with commands that nobody was trained on. They say how well a network fits its "
         "own expert, and nothing about whether it walks.",
+        "experiments.paper.study:summary",
     ),
     "benchmarks": Page(
         "Benchmarks",
@@ -80,17 +81,18 @@ def page(name: str, folder: Path) -> str | None:
         path = folder / f"{study}.json"
         if path.is_file():
             measured[study] = Results.read(path)
-            sections += section(study, measured[study], path.with_suffix(".png").is_file())
+            sections += section(study, measured[study], folder)
     if not measured:
         return None
     lead = [f"# {about.title}", GENERATED, about.about, *about.leading(measured)]
     return "\n\n".join([*lead, *sections, *how_it_was_made([*measured.values()])]) + "\n"
 
 
-def section(name: str, results: Results, picture: bool) -> list[str]:
-    """Paragraphs of one study."""
+def section(name: str, results: Results, folder: Path) -> list[str]:
+    """Paragraphs of one study, with those of its pictures that are in the folder."""
     cls = study_class(name)
-    shown = [f"![{cls.caption}]({name}.png)"] if picture and cls.caption else []
+    captions = {f"{name}{end}.png": caption for end, caption in ({"": cls.caption} | cls.more_captions).items()}
+    shown = [f"![{text}]({file})" for file, text in captions.items() if text and (folder / file).is_file()]
     return [f"## {cls.title}", *cls(cls.full).paragraphs(results), *shown]
 
 

@@ -3,8 +3,8 @@
 import json
 import os
 import platform
-from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -68,6 +68,19 @@ class Results:
             return cls(**data | {"records": tuple(data["records"])})
         except (KeyError, TypeError) as error:
             raise InvalidInputError(f"{path} does not hold the results of a study: {error}") from error
+
+    def beside(self, earlier: "Results", keys: Sequence[str]) -> "Results":
+        """These results, and those records of an earlier run that they do not replace.
+
+        Args:
+            earlier: of the same study.
+            keys: what tells one record from another.
+        """
+        names = {tuple(record.get(key) for key in keys) for record in self.records}
+        kept = [record for record in earlier.records if tuple(record.get(key) for key in keys) not in names]
+        command = " and ".join(dict.fromkeys([earlier.command, self.command]))
+        seconds = {name: earlier.seconds.get(name, 0.0) + value for name, value in self.seconds.items()}
+        return replace(self, records=(*kept, *self.records), command=command, seconds=seconds)
 
     def of(self, **values: Any) -> list[Record]:
         """The records that have these values, in their order."""

@@ -76,6 +76,10 @@ class Study(abc.ABC):
     """What its table shows."""
     caption: ClassVar[str] = ""
     """What its picture shows; empty if it has none."""
+    more_captions: ClassVar[dict[str, str]] = {}
+    """End of a file's name -> what that picture shows, see `more_figures`."""
+    keys: ClassVar[tuple[str, ...]] = ("agent", "task", "condition", "seed")
+    """What tells one record from another."""
     full: ClassVar[Any]
     quick: ClassVar[Any]
     """Options of a whole run, and of one that measures everything and nothing well."""
@@ -116,6 +120,10 @@ class Study(abc.ABC):
         """The results as a picture; None if there is nothing to draw."""
         return None
 
+    def more_figures(self) -> dict[str, Figure]:
+        """Pictures of what the cells left in `folder`, by the end of their files' names."""
+        return {}
+
     def prepare(self, n_jobs: int) -> None:  # noqa: B027
         """Make what the cells share."""
 
@@ -124,18 +132,28 @@ class Study(abc.ABC):
         return {}
 
     @property
+    def cell_options(self) -> Any:
+        """Options that a cell depends on, whichever other cells there are."""
+        return self.options
+
+    @property
+    def shared_options(self) -> Any:
+        """Options that what the cells share depends on."""
+        return self.options
+
+    @property
     def folder(self) -> Path:
         """Of what the cells share; its name changes with the options, the code and the versions."""
-        return self.cache / f"{self.name}-{self._digest()}"
+        return self.cache / f"{self.name}-{self._digest(repr(self.shared_options))}"
 
     def cell_path(self, agent: Agent, cell: Cell, seed: int) -> Path:
         """File of a finished cell; its name changes with anything that could change its metrics."""
-        words = (agent.label, cell.task, cell.condition)
-        stem = re.sub(r"[^\w.-]+", "_", "-".join(filter(None, words)))
-        return self.cache / self.name / f"{stem}-{self._digest(agent.identity, repr(cell), str(seed))}.json"
+        stem = re.sub(r"[^\w.-]+", "_", "-".join(filter(None, (agent.label, cell.task, cell.condition))))
+        words = (agent.identity, repr(cell), str(seed), repr(self.cell_options))
+        return self.cache / self.name / f"{stem}-{self._digest(*words)}.json"
 
     def _digest(self, *words: str) -> str:
-        return digest((*words, repr(self.options), _code((type(self).__module__, *self.code)), repr(versions())))
+        return digest((*words, _code((type(self).__module__, *self.code)), repr(versions())))
 
 
 def digest(words: Iterable[str]) -> str:
