@@ -127,6 +127,10 @@ class Study(abc.ABC):
     def prepare(self, n_jobs: int) -> None:  # noqa: B027
         """Make what the cells share."""
 
+    def published_options(self) -> dict[str, Any]:
+        """The options as they stand in the results file."""
+        return json_ready(asdict(self.options))
+
     def more(self) -> dict[str, Any]:
         """What is needed to show the results beside the records."""
         return {}
@@ -251,7 +255,7 @@ def run(study: Study, seed: int, n_jobs: int = 1, command: str = "", only: Seque
         study=study.name,
         command=command,
         seed=seed,
-        options=json_ready(asdict(study.options)),
+        options=study.published_options(),
         versions=versions(),
         machine=machine(getattr(study.options, "device", "cpu")),
         seconds={name: round(value, 1) for name, value in seconds.items() if value},

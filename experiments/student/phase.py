@@ -91,7 +91,7 @@ def running_phase(policy: trainers.PhaseFreePolicy) -> Estimate:
 
 def _seen(rows: trainers.Demonstrations, policy: Any) -> trainers.Demonstrations:
     """The rows as a policy sees them."""
-    return rows.select(policy.contract.channels, policy.contract.history)
+    return rows.select(policy.contract.channels, policy.contract.history).with_tasks(policy.tasks)
 
 
 def phase_of(rows: trainers.Demonstrations) -> np.ndarray:

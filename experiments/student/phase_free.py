@@ -30,6 +30,7 @@ from experiments.tables import count, markdown, number
 from experiments.training_runs import collect, kept_policy, rows_of
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.sensing.observation import ObservationLayout, SensorNoise
+from go1_mtl_gym.validation import one_of
 from trainers.pipeline.config import NOISE_RAD, JobConfig
 from trainers.pipeline.demonstrations import shard_jobs
 from trainers.pipeline.new_policy import new_policy
@@ -106,11 +107,6 @@ class PhaseFreeOptions:
             )
 
     @property
-    def layout(self) -> ObservationLayout:
-        """Of the rows."""
-        return ObservationLayout(self.job.tasks, self.job.channels, self.job.history)
-
-    @property
     def training(self) -> list[trainers.CollectJob]:
         """Clean and perturbed demonstrations, as the main job's."""
         return shard_jobs(self.job, self.job.clean_s, 0) + self._perturbed(self.job.perturbed_s, 1)
@@ -168,7 +164,10 @@ class PhaseFree(Study):
             policy = agent.load()
             if not isinstance(policy, trainers.PhaseFreePolicy):
                 raise InvalidInputError(f"expected a PhaseFreePolicy, got a {type(policy).__name__}: {agent.path}")
-            self.options.layout.columns(policy.estimator.layout)
+            for task in self.options.job.tasks:
+                one_of(task, policy.tasks, f"gait of {agent.name}")
+            job = self.options.job
+            ObservationLayout(policy.tasks, job.channels, job.history).columns(policy.estimator.layout)
         corrected = [
             replace(agent, name=f"{agent.name}, correction {correction:g}")
             for agent in given

@@ -8,72 +8,71 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from experiments.benchmarks.loops import made_up
+from experiments.benchmarks.turns import N_TASKS, RATE, Heat, TrainingOptions, Turn, seconds
 from go1_mtl_gym.actuation import PDGains
 from go1_mtl_gym.robot import HOME_POSE
 from go1_mtl_gym.sim.simulation import Simulation
 from trainers import Demonstrations, TensorBatches, collect, make_env
 from trainers.data.environments import derive_seed
-from training_parts.loops import made_up
-from training_parts.settings import N_TASKS, Settings
-from training_parts.timing import RATE, Heat, Turn, seconds
 
 SHARDS = 12
 TASK = "trot"
 CONTROL_HZ = 1000
 
 
-def reading(settings: Settings) -> Iterator[Heat]:
+def reading(amounts: TrainingOptions) -> Iterator[Heat]:
     """Shards from disk to one set of demonstrations, against numpy doing that with the arrays alone."""
 
     def contestants(folder: Path) -> Mapping[str, Turn]:
-        data = made_up(settings.stored_rows, N_TASKS, settings.seed)
+        data = made_up(amounts.stored_rows, N_TASKS, amounts.data_seed)
         paths = _write(data, folder)
-        rate = functools.partial(_rate, settings, len(data))
+        rate = functools.partial(_rate, amounts, len(data))
         return {"ours": rate(lambda: _read(paths)), "numpy": rate(lambda: _read_arrays(paths))}
 
-    yield Heat(f"{settings.stored_rows} rows, {SHARDS} files", 1, contestants, ("numpy",))
+    yield Heat(f"{amounts.stored_rows} rows, {SHARDS} files", 1, contestants, ("numpy",))
 
 
-def shuffling(settings: Settings) -> Iterator[Heat]:
+def shuffling(amounts: TrainingOptions) -> Iterator[Heat]:
     """Passes over all rows in a new order, batch by batch, against numpy doing that on the same arrays."""
 
     def contestants(_: Path) -> Mapping[str, Turn]:
-        data = made_up(settings.stored_rows, N_TASKS, settings.seed)
-        batch = functools.partial(TensorBatches, data, settings.batch_size, settings.seed, settings.device)
+        data = made_up(amounts.stored_rows, N_TASKS, amounts.data_seed)
+        batch = functools.partial(TensorBatches, data, amounts.batch_size, amounts.data_seed, amounts.device)
         made = batch()
-        rng = np.random.default_rng(settings.seed)
-        rate = functools.partial(_rate, settings, len(made) * settings.batch_size)
+        rng = np.random.default_rng(amounts.data_seed)
+        rate = functools.partial(_rate, amounts, len(made) * amounts.batch_size)
         return {
             "ours": rate(lambda: _exhaust(made)),
             "ours, first pass": rate(lambda: _exhaust(batch())),
-            "numpy": rate(lambda: _exhaust(_numpy_batches(data, settings.batch_size, rng))),
+            "numpy": rate(lambda: _exhaust(_numpy_batches(data, amounts.batch_size, rng))),
         }
 
-    yield Heat(f"{settings.stored_rows} rows, batches of {settings.batch_size}", 1, contestants, ("numpy",))
+    yield Heat(f"{amounts.stored_rows} rows, batches of {amounts.batch_size}", 1, contestants, ("numpy",))
 
 
-def collection(settings: Settings) -> Iterator[Heat]:
+def collection(amounts: TrainingOptions) -> Iterator[Heat]:
     """Rows from the expert at 1 kHz on one core, against the same walk without the expert, and physics alone."""
 
     def contestants(_: Path) -> Mapping[str, Turn]:
         record = functools.partial(
-            collect, TASK, seed=settings.seed, seconds=settings.collect_s, env_kwargs={"control_hz": CONTROL_HZ}
+            collect, TASK, seed=amounts.data_seed, seconds=amounts.collect_s, env_kwargs={"control_hz": CONTROL_HZ}
         )
         walked = record()
-        rate = functools.partial(_rate, settings, len(walked))
+        rate = functools.partial(_rate, amounts, len(walked))
         env = make_env(TASK, control_hz=CONTROL_HZ, episode_s=1e6)
         simulation = Simulation(PDGains())
         return {
             "expert and environment": rate(record),
-            "environment alone": rate(lambda: _replay(env, walked, settings.seed)),
+            "environment alone": rate(lambda: _replay(env, walked, amounts.data_seed)),
             "MuJoCo alone": rate(lambda: _physics(simulation, walked)),
         }
 
     yield Heat(f"{TASK}, {CONTROL_HZ} Hz, one core", 1, contestants, ("environment alone", "MuJoCo alone"))
 
 
-def _rate(settings: Settings, rows: int, call: Callable[[], Any]) -> Turn:
-    return lambda _: {RATE: rows / seconds(call, settings)}
+def _rate(amounts: TrainingOptions, rows: int, call: Callable[[], Any]) -> Turn:
+    return lambda _: {RATE: rows / seconds(call, amounts)}
 
 
 def _write(data: Demonstrations, folder: Path) -> list[Path]:
@@ -119,6 +118,6 @@ def _replay(env: Any, walked: Demonstrations, seed: int) -> None:
 def _physics(simulation: Simulation, walked: Demonstrations) -> None:
     simulation.reset(HOME_POSE)
     model, data = simulation.model, simulation.data
-    for target in walked.center + walked.half_range * walked.acts:
+    for target in np.array(walked.contract.default_q) + walked.half_range * walked.acts:
         data.ctrl[:] = target
         mujoco.mj_step(model, data)

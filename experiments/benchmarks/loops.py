@@ -1,4 +1,4 @@
-"""Three ways to clone a behaviour: ours, a bare loop of PyTorch, and `imitation`'s own."""
+"""Three ways to clone a behavior: ours, a bare loop of PyTorch, and `imitation`'s own."""
 
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -11,10 +11,10 @@ from imitation.algorithms import bc as imitation_bc
 from imitation.data.types import Transitions
 from stable_baselines3.common.policies import ActorCriticPolicy
 
+from go1_mtl_gym.contract import ObservationTerm, PolicyContract
 from go1_mtl_gym.sensing.observation import FRAME_SIZE
+from experiments.benchmarks.turns import RATE, WARM_UP, Stopwatch, TrainingOptions, Turn
 from trainers import BCConfig, BCTrainer, Demonstrations, MultiHeadPolicy, make_logger
-from training_parts.settings import Settings
-from training_parts.timing import RATE, WARM_UP, Stopwatch, Turn
 
 JOINTS = 12
 
@@ -35,45 +35,48 @@ def made_up(rows: int, n_tasks: int, seed: int, episode: int = 1000) -> Demonstr
     acts = np.empty((rows, JOINTS), dtype=np.float32)
     for k in range(n_tasks):
         acts[task == k] = 0.5 * np.sin(2 * frames[task == k] @ mixing[k])
-    return Demonstrations(
-        obs=np.hstack([frames, np.eye(n_tasks, dtype=np.float32)[task]]),
-        acts=acts,
-        starts=np.arange(rows) % episode == 0,
+    contract = PolicyContract(
         tasks=tuple(f"task {k}" for k in range(n_tasks)),
-        center=np.zeros(JOINTS),
-        half_range=np.linspace(0.5, 1.6, JOINTS),
+        gaits=(),
+        terms=(ObservationTerm("frame", FRAME_SIZE),),
         control_hz=50.0,
+        kp=50.0,
+        kd=2.0,
+        default_q=np.zeros(JOINTS),
+        action_scale=np.linspace(0.5, 1.6, JOINTS),
     )
+    obs = np.hstack([frames, np.eye(n_tasks, dtype=np.float32)[task]])
+    return Demonstrations(obs, acts, np.arange(rows) % episode == 0, contract)
 
 
-def student(data: Demonstrations, width: int, settings: Settings, seed: int = 0) -> MultiHeadPolicy:
-    """An untrained multi-head policy on the device, its normalisation fitted."""
+def student(data: Demonstrations, width: int, amounts: TrainingOptions, seed: int = 0) -> MultiHeadPolicy:
+    """An untrained multi-head policy on the device, its normalization fitted."""
     spaces = _spaces(data)
-    policy = MultiHeadPolicy(*spaces, width=width, n_tasks=len(data.tasks), seed=seed)
+    policy = MultiHeadPolicy(*spaces, contract=data.contract, width=width, seed=seed)
     policy.fit_normalization(data.obs, data.acts)
-    return policy.to(torch.device(settings.device))
+    return policy.to(torch.device(amounts.device))
 
 
-def ours(data: Demonstrations, width: int, settings: Settings, **options: Any) -> Turn:
+def ours(data: Demonstrations, width: int, amounts: TrainingOptions, **options: Any) -> Turn:
     """`trainers.BCTrainer`, with some options of its configuration."""
-    config = BCConfig(steps=settings.steps + WARM_UP, batch_size=settings.batch_size, seed=settings.seed, **options)
+    config = BCConfig(steps=amounts.steps + WARM_UP, batch_size=amounts.batch_size, seed=amounts.data_seed, **options)
 
     def turn(_: int) -> dict[str, float]:
-        watch = Stopwatch(settings)
-        BCTrainer(student(data, width, settings), config).fit(data, on_batch_end=watch)
+        watch = Stopwatch(amounts)
+        BCTrainer(student(data, width, amounts), config).fit(data, on_batch_end=watch)
         return {RATE: watch.rate(config.batch_size)}
 
     return turn
 
 
-def bare(data: Demonstrations, width: int, settings: Settings) -> Turn:
+def bare(data: Demonstrations, width: int, amounts: TrainingOptions) -> Turn:
     """The same arithmetic and nothing else, as one would write it down for this one purpose."""
-    config = BCConfig(steps=settings.steps + WARM_UP, batch_size=settings.batch_size)
+    config = BCConfig(steps=amounts.steps + WARM_UP, batch_size=amounts.batch_size)
 
     def turn(i: int) -> dict[str, float]:
-        watch = Stopwatch(settings)
-        batches = blocks(data, settings.batch_size, settings.seed + i, settings.device)
-        bare_loop(student(data, width, settings), batches, data.half_range, config, watch)
+        watch = Stopwatch(amounts)
+        batches = blocks(data, amounts.batch_size, amounts.data_seed + i, amounts.device)
+        bare_loop(student(data, width, amounts), batches, data.half_range, config, watch)
         return {RATE: watch.rate(config.batch_size)}
 
     return turn
@@ -122,14 +125,14 @@ def bare_loop(
         after_step()
 
 
-def stock(data: Demonstrations, width: int, settings: Settings, own_network: bool) -> Turn:
-    """`imitation`'s BC with its own loader, loss and optimiser.
+def stock(data: Demonstrations, width: int, amounts: TrainingOptions, their_network: bool) -> Turn:
+    """`imitation`'s BC with its own loader, loss and optimizer.
 
     Args:
         data: the demonstrations.
         width: units per hidden layer.
-        settings: how it is run.
-        own_network: whether stable-baselines3's policy with three hidden layers is trained, or our multi-head policy.
+        amounts: how much of everything.
+        their_network: whether stable-baselines3's policy with three hidden layers is trained, or our multi-head policy.
     """
     transitions = as_transitions(data)
     spaces = _spaces(data)
@@ -138,22 +141,22 @@ def stock(data: Demonstrations, width: int, settings: Settings, own_network: boo
         layers: Sequence[int] = [width] * 3
         policy = (
             ActorCriticPolicy(*spaces, lambda _: 1e-3, net_arch=layers, activation_fn=torch.nn.ELU)
-            if own_network
-            else student(data, width, settings)
+            if their_network
+            else student(data, width, amounts)
         )
         trainer = imitation_bc.BC(
             observation_space=spaces[0],
             action_space=spaces[1],
-            rng=np.random.default_rng(settings.seed + i),
+            rng=np.random.default_rng(amounts.data_seed + i),
             policy=policy,
             demonstrations=transitions,
-            batch_size=settings.batch_size,
-            device=settings.device,
+            batch_size=amounts.batch_size,
+            device=amounts.device,
             custom_logger=make_logger(),
         )
-        watch = Stopwatch(settings)
-        trainer.train(n_batches=settings.steps + WARM_UP, on_batch_end=watch, progress_bar=False)
-        return {RATE: watch.rate(settings.batch_size)}
+        watch = Stopwatch(amounts)
+        trainer.train(n_batches=amounts.steps + WARM_UP, on_batch_end=watch, progress_bar=False)
+        return {RATE: watch.rate(amounts.batch_size)}
 
     return turn
 

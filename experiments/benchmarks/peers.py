@@ -9,10 +9,11 @@ import numpy as np
 
 from experts.robot_model import to_pinocchio
 from go1_mtl_gym import Gait
+from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.sensing.state import RobotState
 
 
-class MissingPeer(Exception):
+class MissingPeer(InvalidInputError):
     """A checkout that was asked for cannot be used; the message says what is missing."""
 
 
@@ -43,7 +44,7 @@ class Go2ConvexMPC:
             raise MissingPeer(f"go2-convex-mpc knows trot only, got {gait.name}")
         if not hasattr(np, "trapz"):
             raise MissingPeer(f"go2-convex-mpc does not run on numpy {np.__version__}; it needs numpy < 2.4")
-        sys.path.insert(0, str(source))
+        sys.path.append(str(source))
         try:
             from convex_mpc.centroidal_mpc import CentroidalMPC
             from convex_mpc.com_trajectory import ComTraj
