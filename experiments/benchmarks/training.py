@@ -36,14 +36,14 @@ class TrainingBenchmark(Study):
     full = TrainingOptions()
     quick = TrainingOptions(
         rounds=2,
-        rows=2000,
+        rows=4000,
         batch_size=256,
         widths=(32,),
         threads=(1,),
         steps=3,
         learning_steps=10,
         heads=(1, 4),
-        stored_rows=4000,
+        stored_rows=8000,
         collect_s=0.2,
     )
     alone = True
