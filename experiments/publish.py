@@ -12,6 +12,7 @@ from pathlib import Path
 
 from experiments import main_job
 from experiments.catalog import STUDIES, study_class
+from experiments.plots import save_figure
 from experiments.results import Results, read_json
 from experiments.tables import markdown
 from go1_mtl_gym.errors import InvalidInputError
@@ -94,6 +95,14 @@ def section(name: str, results: Results, folder: Path) -> list[str]:
     captions = {f"{name}{end}.png": caption for end, caption in ({"": cls.caption} | cls.more_captions).items()}
     shown = [f"![{text}]({file})" for file, text in captions.items() if text and (folder / file).is_file()]
     return [f"## {cls.title}", *cls(cls.full).paragraphs(results), *shown]
+
+
+def draw(name: str, folder: Path) -> None:
+    """Redraw the picture of a study from its results."""
+    cls = study_class(name)
+    figure = cls(cls.full).figure(Results.read(folder / f"{name}.json"))
+    if figure is not None:
+        save_figure(figure, folder / f"{name}.png")
 
 
 def how_it_was_made(measured: list[Results]) -> list[str]:
@@ -209,7 +218,10 @@ def publish_command(arguments: list[str], root: Path = ROOT) -> None:
     parser = argparse.ArgumentParser(prog="python -m experiments publish", description=about)
     parser.add_argument("run", type=Path, nargs="?", help="output folder of a finished main job, copied first")
     parser.add_argument("--check", action="store_true", help="change nothing; fail if something is out of date")
+    parser.add_argument("--draw", nargs="+", default=[], choices=tuple(STUDIES), help="redraw the pictures of studies")
     options = parser.parse_args(arguments)
+    for name in options.draw:
+        draw(name, root / "docs" / "results")
     texts(root)  # a README without markers is an error before anything is copied
     if options.run is not None and not options.check:
         copy_run(options.run, root)

@@ -186,7 +186,7 @@ def rehearsal(base: trainers.MultiHeadPolicy, options: NewGaitOptions, folder: P
         job = options.job_of(base, base.tasks, 0)
         perturbation, world = job.perturbation(NOISE_RAD), job.randomization_kwargs
         walks = [
-            trainers.watch(base, task, derive_seed("rehearse", i), options.rehearsal_s, perturbation, **world)[0]
+            trainers.watch(base, task, derive_seed("rehearse", i), options.rehearsal_s, perturbation, **world)
             for i, task in enumerate(base.tasks)
         ]
         trainers.Demonstrations.concatenate(walks).save(path)
