@@ -3,6 +3,7 @@
 import functools
 import warnings
 from collections.abc import Callable
+from dataclasses import is_dataclass
 from typing import Any, TypeVar
 
 Made = TypeVar("Made", bound=type)
@@ -19,7 +20,7 @@ def warn_renamed(old: str, new: str, stacklevel: int = 2) -> None:
 
 
 def renamed_arguments(**names: str) -> Callable[[Made], Made]:
-    """A class decorator: keyword arguments of the constructor go by their old names too, and so do attributes.
+    """A class decorator: keyword arguments of the constructor go by their old names too, and fields of dataclasses.
 
     Args:
         names: old name -> new name.
@@ -36,7 +37,7 @@ def renamed_arguments(**names: str) -> Callable[[Made], Made]:
             init(self, *positional, **keyword)
 
         kind.__init__ = translate  # type: ignore[misc]
-        for old, new in names.items():
+        for old, new in names.items() if is_dataclass(kind) else ():
             setattr(kind, old, _renamed_attribute(f"{kind.__name__}.{old}", new))
         return kind
 

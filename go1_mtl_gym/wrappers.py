@@ -5,6 +5,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from go1_mtl_gym.deprecation import renamed_arguments
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.tasks import TASKS, Task
 from go1_mtl_gym.validation import finite_vector, interval_s, number_in
@@ -13,6 +14,7 @@ NOISE_CORRELATION_S = 0.1
 """Correlation time of the action noise [s]."""
 
 
+@renamed_arguments(kick="push", kick_interval="push_interval", corner_share="corner_fraction")
 class PerturbationWrapper(gymnasium.Wrapper):
     """Disturbs a Go1 so that its expert is seen recovering.
 
@@ -61,9 +63,9 @@ class PerturbationWrapper(gymnasium.Wrapper):
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[np.ndarray, dict]:
         """Reset the environment; a seed also seeds the disturbances."""
+        result = self.env.reset(seed=seed, options=options)
         if seed is not None:
             self._rng = np.random.default_rng([seed, 0x9E3779B9])
-        result = self.env.reset(seed=seed, options=options)
         self._sigma = self._rng.uniform(0.0, self._noise_rad) / self.env.unwrapped.action_map.half_range
         self._noise = self._sigma * self._rng.standard_normal(12)
         self._next_push = self._rng.exponential(self._push_interval)

@@ -79,7 +79,7 @@ def test_it_survives_json():
         ({"rotor_inertia": (0.0, float("nan"))}, "range of rotor_inertia must be finite"),
         ({"contact_time_s": ("soft", "stiff")}, "range of contact_time_s must be 2 numbers.*soft"),
         ({"noise": (-1.0, 1.0)}, "factor on the sensor noise.*got -1"),
-        ({"fraction": 1.5}, r"fraction of randomised episodes must lie in \[0, 1\], got 1.5"),
+        ({"fraction": 1.5}, r"fraction of randomized episodes must lie in \[0, 1\], got 1.5"),
     ],
 )
 def test_impossible_ranges_are_refused(arguments, words):
