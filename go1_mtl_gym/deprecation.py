@@ -4,7 +4,7 @@ import functools
 import warnings
 from collections.abc import Callable
 from dataclasses import is_dataclass
-from typing import Any, TypeVar
+from typing import TypeVar
 
 Made = TypeVar("Made", bound=type)
 
@@ -13,7 +13,8 @@ def warn_renamed(old: str, new: str, stacklevel: int = 2) -> None:
     """Say that a name is an old one.
 
     Args:
-        old, new: the names.
+        old: what was written.
+        new: what to write instead.
         stacklevel: whose line the warning shows, counted from the caller of this function.
     """
     warnings.warn(f"{old} is an old name; write {new}", DeprecationWarning, stacklevel=stacklevel + 1)
@@ -30,7 +31,7 @@ def renamed_arguments(**names: str) -> Callable[[Made], Made]:
         init = kind.__init__  # type: ignore[misc]
 
         @functools.wraps(init)
-        def translate(self: Any, *positional: Any, **keyword: Any) -> None:
+        def translate(self: object, *positional: object, **keyword: object) -> None:
             for old in names.keys() & keyword.keys():
                 warn_renamed(f"{kind.__name__}({old}=)", names[old])
                 keyword[names[old]] = keyword.pop(old)
@@ -38,14 +39,21 @@ def renamed_arguments(**names: str) -> Callable[[Made], Made]:
 
         kind.__init__ = translate  # type: ignore[misc]
         for old, new in names.items() if is_dataclass(kind) else ():
-            setattr(kind, old, _renamed_attribute(f"{kind.__name__}.{old}", new))
+            setattr(kind, old, renamed_attribute(f"{kind.__name__}.{old}", new))
         return kind
 
     return decorate
 
 
-def _renamed_attribute(old: str, new: str) -> property:
-    def read(self: Any) -> Any:
+def renamed_attribute(old: str, new: str) -> property:
+    """An attribute that is read by its old name.
+
+    Args:
+        old: the name, as the message has it.
+        new: of the attribute.
+    """
+
+    def read(self: object) -> object:
         warn_renamed(old, new)
         return getattr(self, new)
 

@@ -2,19 +2,20 @@
 
 import copy
 from collections import deque
-from collections.abc import Sequence
 from numbers import Integral
 from typing import Any
 
 import gymnasium
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ResetNeeded
 from gymnasium.spaces import Box
+from numpy.typing import ArrayLike
 
 from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PHYSICS_HZ, ActionMap
 from go1_mtl_gym.contract import PolicyContract
-from go1_mtl_gym.deprecation import warn_renamed
+from go1_mtl_gym.deprecation import renamed_attribute
 from go1_mtl_gym.env_config import RENDER_MODES, EnvConfig
 from go1_mtl_gym.episode import Episode, draw_conditions, how_it_ended
 from go1_mtl_gym.errors import InvalidInputError
@@ -40,7 +41,7 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
 
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 50}
 
-    def __init__(self, task: EnvConfig | str | None = "trot", **arguments: Any) -> None:
+    def __init__(self, task: EnvConfig | str | None = "trot", **arguments: object) -> None:
         """Make the environment; see the class."""
         if isinstance(task, EnvConfig) and arguments:
             raise InvalidInputError(f"an EnvConfig says everything; beside it came {', '.join(arguments)}")
@@ -196,11 +197,7 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
         """What is different about the physics now."""
         return self._simulation.physics_params
 
-    @property
-    def realism(self) -> PhysicsParams:
-        """The old name of `physics_params`."""
-        warn_renamed("Go1Env.realism", "Go1Env.physics_params")
-        return self.physics_params
+    realism = renamed_attribute("Go1Env.realism", "physics_params")
 
     @property
     def simulation(self) -> Simulation:
@@ -247,7 +244,7 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
         new.check_command(episode.command)
         episode.change_task(new, None if phase is None else check_phase(phase))
 
-    def set_command(self, command: Sequence[float]) -> None:
+    def set_command(self, command: ArrayLike) -> None:
         """Ask for another (vx [m/s], vy [m/s], yaw rate [rad/s]); it is low-passed before expert and student see it.
 
         Raises:
@@ -256,7 +253,7 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
         episode = self._running("set_command")
         episode.change_command(episode.requested_task.check_command(command))
 
-    def push(self, delta_velocity_w: Sequence[float]) -> None:
+    def push(self, delta_velocity_w: ArrayLike) -> None:
         """Push the trunk: add to its linear velocity [m/s], world frame, shape (3,).
 
         Raises:

@@ -109,9 +109,8 @@ class Camera:
     def _check_thread(self, action: str) -> None:
         if threading.get_ident() != self._thread:
             raise RenderingError(
-                f"cannot {action} in thread {threading.current_thread().name!r}: the environment drew its first picture "
-                "in another one, to which its OpenGL context belongs; render and close in one thread, or give each "
-                "thread an environment"
+                f"cannot {action} in the thread {threading.current_thread().name!r}: the OpenGL context belongs to the "
+                "thread that drew the first picture; draw and close there, or give each thread its own environment"
             )
 
 
