@@ -67,7 +67,7 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
     # -- Gymnasium ---------------------------------------------------------------------------------------------------
 
     @property
-    def spec(self) -> EnvSpec | None:  # type: ignore[override]
+    def spec(self) -> EnvSpec | None:
         """What `gymnasium.make` made the environment from, and as its `max_episode_steps` the steps of an episode.
 
         The environment truncates its episodes itself, after `episode_s`; so the registered ids bring no time limit.

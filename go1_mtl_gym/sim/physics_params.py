@@ -1,6 +1,7 @@
 """Ways in which a real robot differs from the model that its expert has in mind: mass, motors, contacts, delay."""
 
-from dataclasses import astuple, dataclass, fields
+from dataclasses import astuple, dataclass
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -76,8 +77,8 @@ class PhysicsParams:
     @classmethod
     def from_vector(cls, vector: np.ndarray) -> "PhysicsParams":
         """The inverse of `as_vector`."""
-        values = (None if value == _NONE else value for value in vector.tolist())
-        return cls(**dict(zip((each.name for each in fields(cls)), values, strict=True)))
+        values: list[Any] = [None if value == _NONE else value for value in vector.tolist()]
+        return cls(*values)
 
     def apply(self, model: mujoco.MjModel) -> None:
         """Change a model whose PD gains are set already; `mj_setConst` is left to the caller.
