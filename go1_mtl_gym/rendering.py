@@ -1,5 +1,7 @@
 """Pictures of the robot, with its foot contacts and its command drawn in: off screen or in a window."""
 
+import ctypes.util
+import importlib
 import os
 import sys
 import threading
@@ -25,6 +27,41 @@ ARROW_S = 0.6
 
 class RenderingError(Go1Error, RuntimeError):
     """No picture can be drawn on this machine."""
+
+
+def choose_backend() -> None:
+    """On Linux without a display, let MuJoCo draw by EGL, or by OSMesa where only that is installed.
+
+    MuJoCo reads the environment variable MUJOCO_GL once, when it is imported, and takes GLFW if it is not set, which
+    needs a display. So the module that reads it is loaded again here, before the first picture. A choice that the user
+    has made stays, and child processes inherit ours.
+    """
+    if not sys.platform.startswith("linux") or "MUJOCO_GL" in os.environ or has_display():
+        return
+    only_osmesa = ctypes.util.find_library("OSMesa") and not ctypes.util.find_library("EGL")
+    os.environ["MUJOCO_GL"] = "osmesa" if only_osmesa else "egl"
+    try:
+        importlib.reload(sys.modules[mujoco.Renderer.__module__].gl_context)
+    except Exception:  # no such library; child processes would fail to import MuJoCo
+        del os.environ["MUJOCO_GL"]
+        raise
+
+
+def has_display() -> bool:
+    """Whether a window system is there, as X11 and Wayland announce it."""
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def why_no_pictures() -> str:
+    """Draw one small picture off screen; the empty string, or what went wrong."""
+    try:
+        choose_backend()
+        model = mujoco.MjModel.from_xml_string("<mujoco/>")
+        with mujoco.Renderer(model, 16, 16) as renderer:
+            renderer.render()
+    except Exception as error:  # the type differs from one OpenGL backend to the next
+        return f"no OpenGL (MUJOCO_GL={os.environ.get('MUJOCO_GL', 'unset')}): {error}"
+    return ""
 
 
 def annotate(scene: mujoco.MjvScene, simulation: Simulation, state: RobotState) -> None:
@@ -80,6 +117,7 @@ class Camera:
         buffer = simulation.model.vis.global_
         buffer.offwidth, buffer.offheight = max(buffer.offwidth, width), max(buffer.offheight, height)
         try:
+            choose_backend()
             self._renderer = mujoco.Renderer(simulation.model, height, width)
         except Exception as error:  # the type differs from one OpenGL backend to the next
             raise RenderingError(
@@ -157,7 +195,7 @@ class Viewer:
     def __init__(self, simulation: Simulation, width: int, height: int, fps: float) -> None:
         """Open the window."""
         # without a display GLFW ends the whole process instead of raising
-        if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        if sys.platform.startswith("linux") and not has_display():
             raise RenderingError('cannot open a window: there is no display; use render_mode="rgb_array"')
         import mujoco.viewer
 

@@ -13,7 +13,7 @@ import pytest
 
 from go1_mtl_gym import robot
 from go1_mtl_gym.env import Go1Env
-from go1_mtl_gym.rendering import CONTACT_COLOR, Pace, RenderingError, annotate
+from go1_mtl_gym.rendering import CONTACT_COLOR, Pace, RenderingError, annotate, why_no_pictures
 
 
 @pytest.fixture
@@ -184,3 +184,38 @@ def test_off_screen_without_open_gl_says_what_to_try():
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems always have a display")
 def test_a_window_without_a_display_says_what_to_do_instead():
     assert "rgb_array" in refusal("human", "egl")
+
+
+_WITHOUT_A_CHOICE = """
+import os, sys
+import mujoco
+from go1_mtl_gym.env import Go1Env
+env = Go1Env("trot", render_mode="rgb_array", width=32, height=32)
+env.reset(seed=0)
+assert "MUJOCO_GL" not in os.environ, "nothing is chosen before the first picture"
+assert env.render().std() > 5
+print(os.environ["MUJOCO_GL"])
+"""
+
+
+@pytest.mark.gl
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems always have a display")
+def test_the_first_picture_needs_no_display_and_no_environment_variable():
+    kept = {
+        name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL")
+    }
+    done = subprocess.run(
+        [sys.executable, "-c", _WITHOUT_A_CHOICE],
+        env=kept | {"PYTHONPATH": os.pathsep.join(sys.path)},
+        capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+    assert done.stdout.strip() in ("egl", "osmesa"), done.stderr
+
+
+def test_a_picture_that_cannot_be_drawn_has_a_reason(monkeypatch):
+    def refuse(*_):
+        raise RuntimeError("no framebuffer")
+
+    monkeypatch.setattr(mujoco, "Renderer", refuse)
+    monkeypatch.setenv("MUJOCO_GL", "egl")
+    assert why_no_pictures() == "no OpenGL (MUJOCO_GL=egl): no framebuffer"
