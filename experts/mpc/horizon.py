@@ -1,6 +1,6 @@
 """One problem of the MPC from a state: reference, contacts, feet and nominal forces over one gait cycle."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,8 +15,7 @@ from go1_mtl_gym import robot
 from go1_mtl_gym.sensing.state import RobotState
 
 
-@dataclass(frozen=True)
-class Horizon:
+class Horizon(NamedTuple):
     """What the rigid body starts from, is to follow, and pushes with; everything in `frame`.
 
     Attributes:

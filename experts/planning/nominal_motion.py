@@ -42,6 +42,14 @@ class NominalMotion:
         samples, slopes = self._table
         return samples[low] + (where - low)[:, None] * slopes[low]
 
+    def sway_velocity(self, phase: float) -> complex:
+        """Horizontal velocity at one phase [cycles], heading frame, x + iy [m/s]; as `at` says, without its arrays."""
+        where = phase % 1.0 * SAMPLES
+        low = int(where)
+        samples, slopes = self._table
+        x, y = samples[low, 9:11] + (where - low) * slopes[low, 9:11]
+        return complex(x, y)
+
     def force_at(self, phase: np.ndarray) -> np.ndarray:
         """Forces in units of the weight at phases [cycles], shape (len(phase), 4, 3); the sample below."""
         return self.force[(np.mod(phase, 1.0) * SAMPLES).astype(int) % SAMPLES]
