@@ -1,9 +1,9 @@
 """Which phase of its gait a robot is in, told from its motion alone.
 
 A gait's nominal cycle says what everything should look like at each phase. With lambda the phase of a leg in its own
-cycle, T the period, beta the duty, w = (1 - early)(1 - beta) the fraction of the cycle in which the foot is under way, v
-the mean velocity of the body at the leg (heading frame; measured, less the nominal sway at the phase in question) and x
-the foot's place relative to the point under its hip,
+cycle, T the period, beta the duty, w = (1 - early)(1 - beta) the fraction of the cycle in which the foot is under way,
+v the mean velocity of the body at the leg (heading frame; measured, less the nominal sway at the phase in question) and
+x the foot's place relative to the point under its hip,
 
     (1)  x = v T (beta/2 - k(lambda)) - d,    xdot_world = v (1 - k'(lambda)),
          k = lambda                  in stance: the body passes over the foot, half a stride before it to half behind,
@@ -209,7 +209,7 @@ def _cycle(gait: Gait, swing: SwingRule, com_height: float) -> _Cycle:
 
 
 def _contact_fraction(leg: np.ndarray, duty: float, waiting: float) -> np.ndarray:
-    """1 on the ground, 0 in the air, with ramps; the foot is down a fraction `waiting` of the cycle before its stance."""
+    """1 on the ground, 0 in the air, with ramps; the foot is down for `waiting` cycles before its stance begins."""
     since = np.mod(leg + waiting, 1.0)
     length = duty + waiting
     centered = np.abs(since - length / 2)

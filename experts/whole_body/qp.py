@@ -195,7 +195,7 @@ class WholeBodyQP:
         return weight
 
     def _bounds(self, stance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The bounds l and u, shape (32,); none for a foot in the air: its force does nothing but cost, so it is zero."""
+        """The bounds l and u, shape (32,); none for a foot in the air: its force does nothing but cost."""
         l, u = np.empty(_LIMITS), np.full(_LIMITS, np.inf)
         l[:12], u[:12] = -self._torque_limit, self._torque_limit
         l[12:] = np.where(np.repeat(stance, ROWS_PER_FOOT), -self.config.slack / _FORCE_UNIT, -np.inf)
