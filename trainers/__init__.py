@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from trainers.algorithms.dagger_collector import BlockCollector
     from trainers.algorithms.losses import MultiTaskLoss
     from trainers.algorithms.phase_free import PhaseConfig, train_phase, train_phase_free
+    from trainers.algorithms.ppo import ppo_from_policy
     from trainers.data.batches import TensorBatches
     from trainers.data.collection import CollectJob, ShardMismatchError, collect, collect_all, watch
     from trainers.data.demonstrations import Demonstrations
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
     from trainers.evaluation.metrics import offline_metrics
     from trainers.evaluation.scoring import ClosedLoopResult, EpisodeRecord
     from trainers.evaluation.video import record_frames, save_gif, tile
+    from trainers.pipeline.config import JobConfig
+    from trainers.pipeline.job import Job
     from trainers.policies.checkpoint import CheckpointError
     from trainers.policies.expert_policy import ExpertPolicy
     from trainers.policies.loading import load
@@ -51,6 +54,8 @@ _HOME = {
     "Demonstrations": "data.demonstrations",
     "EpisodeRecord": "evaluation.scoring",
     "ExpertPolicy": "policies.expert_policy",
+    "Job": "pipeline.job",
+    "JobConfig": "pipeline.config",
     "Learner": "policies.stateful",
     "MultiHeadPolicy": "policies.multi_head",
     "MultiTaskLoss": "algorithms.losses",
@@ -78,6 +83,7 @@ _HOME = {
     "offline_metrics": "evaluation.metrics",
     "paper_table": "utils.report",
     "phase_errors": "policies.phase_estimator",
+    "ppo_from_policy": "algorithms.ppo",
     "record_frames": "evaluation.video",
     "results_table": "utils.report",
     "save_gif": "evaluation.video",
