@@ -37,6 +37,7 @@ myst_enable_extensions = ["colon_fence", "deflist", "dollarmath", "fieldlist"]
 myst_heading_anchors = 3
 
 html_theme = "furo"
+pygments_dark_style = "monokai"
 html_title = f"go1-mtl-gym {version}"
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
