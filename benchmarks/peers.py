@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from experts.model import to_pinocchio
+from experts.robot_model import to_pinocchio
 from go1_mtl_gym import Gait
 from go1_mtl_gym.sensing.state import RobotState
 

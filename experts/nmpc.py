@@ -5,7 +5,7 @@ One call runs once through the chain
     state -> Pinocchio -> reference and footholds -> rigid-body model, linearized -> QP -> ground forces
           -> whole-body torques -> joint targets of the PD actuators.
 
-What is nonlinear in it. The model of `experts.dynamics` is: attitude kinematics, lever arms, gyroscopic moments, an
+What is nonlinear in it. The model of `experts.mpc.srbd` is: attitude kinematics, lever arms, gyroscopic moments, an
 inertia that is computed anew from the configuration at every call. Each call linearizes it along the reference and
 solves a QP, as convex MPC does. If the solution stays within `sqp_tolerance` of the trajectory that it was linearized
 along, as it does in steady walking, that is all; if not, as after a push, the model is linearized again along the
@@ -24,36 +24,41 @@ than the trunk, and a jump that swings them all forward turns the trunk back.
 By default nothing is remembered from call to call but counters, so the action is a function of the `RobotState`.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from itertools import pairwise
 
 import numpy as np
 
-from experts.dynamics import COM, FORCE_UNIT, RPY, linearize
-from experts.footholds import FootholdRule
-from experts.jacobian_transpose import jacobian_transpose_torques
-from experts.model import Dynamics, RobotModel
-from experts.mpc import LARGEST, MPC, MPCConfig, Solution
-from experts.nominal import NominalMotion, nominal_motion, standing_motion
-from experts.planar import to_complex, turn
-from experts.reference import body_reference
-from experts.swing import SwingRule
-from experts.trajectory import Frame, Recall, Trajectory
-from experts.whole_body import joint_torques
-from experts.whole_body_qp import WholeBodyQP
+from experts.mpc.config import MPCConfig
+from experts.mpc.controller import MPC, Solution
+from experts.mpc.horizon import Horizon, pose_horizon
+from experts.mpc.srbd import COM, RPY, linearize
+from experts.mpc.warm_start import Recall, Trajectory
+from experts.planning.body_reference import COM_HEIGHT
+from experts.planning.contact_timing import contact_pieces, swing_middle
+from experts.planning.footholds import FootholdRule
+from experts.planning.nominal_motion import NominalMotion, nominal_motion, standing_motion
+from experts.planning.plane import to_complex, turn
+from experts.planning.swing import SwingRule
+from experts.plausibility import plausible
+from experts.robot_model import Dynamics, RobotModel
+from experts.whole_body.inverse_dynamics import joint_torques
+from experts.whole_body.jacobian_transpose import jacobian_transpose_torques
+from experts.whole_body.qp import WholeBodyQP
 from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PDGains
 from go1_mtl_gym.sensing.state import RobotState
 from go1_mtl_gym.validation import number_in, one_of
 
-WHOLE_BODY = {
+WholeBody = Callable[[Dynamics, np.ndarray, np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+"""Dynamics, forces, stance and swing accelerations to joint torques and accelerations."""
+
+WHOLE_BODY: dict[str, Callable[[], WholeBody]] = {
     "closed_form": lambda: joint_torques,
     "qp": lambda: WholeBodyQP().torques,
     "jacobian_transpose": lambda: jacobian_transpose_torques,
 }
 """Ways from forces to torques by name; the first, the default, tracks best for its time (docs/results)."""
-SHORTEST_PIECE_S = 1e-3
-"""Contact changes closer than this to each other or to the ends of a hold are taken as one [s]."""
 
 
 @dataclass(frozen=True)
@@ -74,10 +79,10 @@ class NMPCConfig:
         swing: how feet get there.
 
     Raises:
-        InvalidInputError: if a figure is outside its range or a name is unknown.
+        InvalidInputError: if a number is outside its range or a name is unknown.
     """
 
-    com_height: float = 0.28
+    com_height: float = COM_HEIGHT
     linearization: str = "reference"
     sqp_iterations: int = 3
     sqp_tolerance: float = 0.2
@@ -128,13 +133,24 @@ class Counters:
 class NMPCExpert:
     """Model predictive expert for every `Gait`; needs no environment.
 
+    An expert that was used can be copied and pickled: a copy answers as the original would. It is given what the
+    original remembers, counters included; solvers and Pinocchio's data are made anew, and show in no answer.
+
     Args:
         gains: of the PD actuators that will track the targets.
         hold_s: for how long each target is held [s]; the environment's control period.
         config: see `NMPCConfig`.
 
     Attributes:
+        gains: of the PD actuators that the targets are for. With other gains in the environment the same targets mean
+            other torques, so whoever joins the two compares them.
+        hold_s: for how long each target is meant to be held [s]; to be compared with the control period likewise.
+        config: everything else.
         counters: what happened since the last `reset`.
+
+    Raises:
+        InvalidInputError: if `hold_s` lies outside [0, 0.1].
+        ImportError: if the configured solver is not installed.
     """
 
     def __init__(self, gains: PDGains | None = None, hold_s: float = 0.02, config: NMPCConfig | None = None) -> None:
@@ -156,10 +172,11 @@ class NMPCExpert:
     def action(self, state: RobotState) -> np.ndarray:
         """Joint targets for the PD actuators [rad], shape (12,), legs FL FR RL RR; never NaN, never an exception."""
         self.counters.calls += 1
-        if not _plausible(state):
+        if not _is_plausible(state):
             self.counters.bad_states += 1
             return robot.HOME_POSE.copy()
         torque, acceleration = self.torque(state)
+        # The torque is to be right in the middle of the hold: where the joints will be then, uniformly accelerated.
         half = self.hold_s / 2
         q = state.q + half * state.v + half**2 / 2 * acceleration
         v = state.v + half * acceleration
@@ -174,12 +191,13 @@ class NMPCExpert:
         velocity_w = self.mean_velocity(state, dynamics)
         ahead_s = swing_middle(state, self.hold_s)
         swing = self.config.swing.acceleration(state, ahead_s, dynamics, velocity_w, self.config.footholds)
+        # Where feet touch down or lift off during the hold, one target has to serve both: the mean over time.
         torque, acceleration = np.zeros(12), np.zeros(12)
-        for middle_s, share in contact_pieces(state, self.hold_s):
+        for middle_s, fraction in contact_pieces(state, self.hold_s):
             stance = state.gait.stance(state.phase + middle_s / state.gait.period)
             part = self._whole_body(dynamics, forces, stance, swing)
-            torque += share * part[0]
-            acceleration += share * part[1]
+            torque += fraction * part[0]
+            acceleration += fraction * part[1]
         return torque, acceleration
 
     def forces(self, state: RobotState, dynamics: Dynamics) -> np.ndarray:
@@ -196,45 +214,40 @@ class NMPCExpert:
     def plan(self, state: RobotState, dynamics: Dynamics) -> Trajectory:
         """Predict states and forces over one gait cycle; the nominal load along the reference if no solve is usable.
 
-        The program is posed in the frame below the centre of mass that faces where the robot does, so that it is the
-        same wherever the robot is.
+        Args:
+            state: the robot now.
+            dynamics: at the state.
         """
-        config, gait = self.config, state.gait
-        steps = config.mpc.steps
-        dt = gait.period / steps
-        motion = self.motion(state)
-        roll, pitch, yaw = whole_body_attitude(state, dynamics)
-        frame = Frame(dynamics.com_w, yaw)
-        com = np.array([0.0, 0.0, dynamics.com_w[2]])
-        reference = body_reference(state, 0.0, com, motion, config.com_height, dt, steps)
-        middle = state.phase + (np.arange(steps) + 0.5) / steps
-        contact = np.ones((steps, 4)) if state.standing else gait.contact_schedule(state.phase, dt, steps)
-        velocity_w = self.mean_velocity(state, dynamics)
-        feet_w = config.footholds.over_horizon(state, dynamics.com_w, velocity_w, dynamics.feet_w, middle)
-        nominal = motion.force_at(middle) * (robot.MASS * robot.GRAVITY / FORCE_UNIT)
-        sideways = to_complex(nominal) * turn(reference[:-1, 2:3])
-        nominal[..., 0], nominal[..., 1] = sideways.real, sideways.imag
-        nominal = nominal.reshape(steps, 12)
-        feet = frame.points(feet_w)
-        turning, moving = frame.vectors(np.stack([dynamics.mean_omega_w, dynamics.com_velocity_w]))
-        x0 = np.concatenate([(roll, pitch, 0.0), com, turning, moving])
-        inertia_b = state.rotation.T @ dynamics.inertia_w @ state.rotation
-
-        states, inputs = reference, nominal
+        config = self.config
+        motion, velocity_w = self.motion(state), self.mean_velocity(state, dynamics)
+        horizon = pose_horizon(
+            state, dynamics, motion, velocity_w, config.footholds, config.com_height, config.mpc.steps
+        )
         earlier = self._recall.before(state) if config.linearization == "shifted" else None
-        if earlier is not None:
-            states, inputs = earlier.shifted(state.time_s, frame, reference, nominal)
+        if earlier is None:
+            states, inputs = horizon.reference, horizon.nominal
+        else:
+            states, inputs = earlier.shifted(state.time_s, horizon.frame, horizon.reference, horizon.nominal)
+        states, inputs = self._solve_sequence(horizon, states, inputs)
+        return Trajectory(state.time_s, state.gait, horizon.dt, states, inputs, horizon.frame)
+
+    def _solve_sequence(
+        self, horizon: Horizon, states: np.ndarray, inputs: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Sequential quadratic programming from a trajectory, shapes (N + 1, 12) and (N, 12), to the next one."""
+        config = self.config
         for _ in range(config.sqp_iterations):
-            model = linearize(states, inputs, feet, inertia_b, dt)
-            solution = self._mpc.solve(model, x0, reference[1:], nominal, contact)
+            model = linearize(states, inputs, horizon.feet, horizon.inertia_b, horizon.dt)
+            solution = self._mpc.solve(model, horizon.x0, horizon.reference[1:], horizon.nominal, horizon.contact)
             self.counters.count(solution)
             if not solution.usable:
-                return Trajectory(state.time_s, gait, dt, reference, nominal, frame)
-            before, states, inputs = states, np.vstack([x0, solution.states]), solution.inputs
+                return horizon.reference, horizon.nominal
+            before, states, inputs = states, np.vstack([horizon.x0, solution.states]), solution.inputs
+            # The model is nonlinear in attitude and lever arms alone, so these two say whether it still holds.
             moved = np.abs(states - before)
             if max(moved[:, RPY].max(), moved[:, COM].max() / config.com_height) < config.sqp_tolerance:
                 break
-        return Trajectory(state.time_s, gait, dt, states, inputs, frame)
+        return states, inputs
 
     def mean_velocity(self, state: RobotState, dynamics: Dynamics) -> np.ndarray:
         """Horizontal velocity of the centre of mass without the gait's own sway, world [m/s], shape (2,)."""
@@ -249,34 +262,8 @@ class NMPCExpert:
         return nominal_motion(state.gait, self._standing_inertia, self.config.com_height - robot.FOOT_RADIUS)
 
 
-def whole_body_attitude(state: RobotState, dynamics: Dynamics) -> np.ndarray:
-    """Roll, pitch, yaw [rad] of trunk and legs together, for small angles between the two, shape (3,)."""
-    lean = to_complex(dynamics.lean_w) * turn(-state.rpy[2])
-    return state.rpy + np.array([lean.real, lean.imag, dynamics.lean_w[2]])
-
-
-def swing_middle(state: RobotState, hold_s: float) -> np.ndarray:
-    """Time until the middle of what a hold contains of each leg's swing [s], shape (4,); its end if it has none."""
-    gait = state.gait
-    leg = gait.leg_phase(state.phase)
-    lift_off, touchdown = (gait.duty - leg) * gait.period, (1.0 - leg) * gait.period
-    return (np.clip(lift_off, 0.0, hold_s) + np.minimum(touchdown, hold_s)) / 2
-
-
-def contact_pieces(state: RobotState, hold_s: float) -> list[tuple[float, float]]:
-    """The parts of a hold between which feet touch down or lift off: middle [s] and share of the hold of each."""
-    gait = state.gait
-    leg = gait.leg_phase(state.phase)
-    edges = np.concatenate([(gait.duty - leg) % 1.0, 1.0 - leg]) * gait.period
-    cuts = [0.0]
-    for edge in sorted(edges[edges < hold_s - SHORTEST_PIECE_S].tolist()):
-        if edge > cuts[-1] + SHORTEST_PIECE_S:
-            cuts.append(edge)
-    cuts.append(hold_s)
-    return [((a + b) / 2, (b - a) / hold_s if hold_s else 1.0) for a, b in pairwise(cuts)]
-
-
-def _plausible(state: RobotState) -> bool:
+def _is_plausible(state: RobotState) -> bool:
+    """Whether every number of a state is finite and could be a robot's."""
     numbers = (
         state.position_w,
         state.quat_wxyz,
@@ -287,4 +274,4 @@ def _plausible(state: RobotState) -> bool:
         state.command,
         (state.phase, state.time_s),
     )
-    return bool(np.abs(np.concatenate(numbers)).max() < LARGEST)
+    return plausible(np.concatenate(numbers))

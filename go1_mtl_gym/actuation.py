@@ -61,6 +61,13 @@ class ActionMap:
         low, high = robot.JOINT_LOWER - margin, robot.JOINT_UPPER + margin
         return cls(center=(low + high) / 2, half_range=(high - low) / 2)
 
+    @classmethod
+    def of_version_0_1(cls, gains: PDGains) -> "ActionMap":
+        """The map of version 0.1, centered on the middle of the widened joint range."""
+        margin = (robot.TORQUE_LIMIT + gains.kd * robot.SPEED_LIMIT) / gains.kp
+        low, high = robot.JOINT_LOWER - margin, robot.JOINT_UPPER + margin
+        return cls(center=(low + high) / 2, half_range=(high - low) / 2)
+
     def to_radians(self, action: np.ndarray) -> np.ndarray:
         """Joint targets [rad] of actions, shape (..., 12)."""
         return self.center + self.half_range * action

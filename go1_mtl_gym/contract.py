@@ -151,15 +151,26 @@ class PolicyContract:
             "kd": self.kd,
         }
 
+    def describe(self) -> str:
+        """The terms and their sizes, and the tasks, for messages."""
+        return f"{_short(self.terms)} and the task id of {', '.join(self.tasks)}"
+
     def to_radians(self, actions: np.ndarray) -> np.ndarray:
         """Joint targets [rad] of actions, shape (..., joints)."""
         return np.array(self.default_q) + np.array(self.action_scale) * actions
 
     # -- Other contracts -----------------------------------------------------------------------------------------------
 
-    def with_tasks(self, tasks: Sequence[str], gaits: Sequence[Gait] = ()) -> "PolicyContract":
-        """The same with another task id."""
-        return replace(self, tasks=tuple(tasks), gaits=tuple(gaits))
+    def with_tasks(self, tasks: Sequence[str], gaits: Mapping[str, Gait] | None = None) -> "PolicyContract":
+        """The same with another task id.
+
+        Args:
+            tasks: names in one-hot order.
+            gaits: of the tasks that are new here, by their names; without them no gait is known afterwards.
+        """
+        known = dict(zip(self.tasks, self.gaits)) | dict(gaits or {})
+        complete = all(name in known for name in tasks)
+        return replace(self, tasks=tuple(tasks), gaits=tuple(known[name] for name in tasks) if complete else ())
 
     def with_terms(self, terms: Sequence[ObservationTerm]) -> "PolicyContract":
         """The same with other parts of the observation."""

@@ -14,7 +14,7 @@ from go1_mtl_gym import arguments, robot
 from go1_mtl_gym.actuation import ActionMap, PDGains
 from go1_mtl_gym.contract import PolicyContract
 from go1_mtl_gym.episode import Episode
-from go1_mtl_gym.expert import DEFAULT_EXPERT, check_expert, load_expert
+from go1_mtl_gym.expert import DEFAULT_EXPERT, check_expert, check_expert_fits, load_expert
 from go1_mtl_gym.registration import register_task
 from go1_mtl_gym.sensing.observation import ObservationLayout, SensorNoise
 from go1_mtl_gym.sensing.state import RobotState
@@ -243,6 +243,7 @@ class Go1Env(gymnasium.Env):
         state = self.estimated_state
         if self._expert is None:
             self._expert = load_expert(self._make_expert)(gains=self.gains, hold_s=self.control_s)
+            check_expert_fits(self._expert, self.gains, self.control_s)
             self._expert.reset(state)
         return self.action_map.from_radians(self._expert.action(state)).astype(np.float32)
 

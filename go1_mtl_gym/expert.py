@@ -6,6 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
+from go1_mtl_gym.actuation import PDGains
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.sensing.state import RobotState
 
@@ -50,3 +51,22 @@ def load_expert(expert: str | Callable[..., Expert]) -> Callable[..., Expert]:
         return getattr(import_module(module), name)
     except AttributeError as error:
         raise InvalidInputError(f"expert {expert!r}: the module {module} holds no {name}") from error
+
+
+def check_expert_fits(expert: object, gains: PDGains, hold_s: float) -> None:
+    """Refuse an expert that was made for another environment.
+
+    Args:
+        expert: compared by its attributes `gains` and `hold_s`, where it has them.
+        gains: of the environment's actuators.
+        hold_s: time for which the environment holds an action [s].
+
+    Raises:
+        InvalidInputError: if one of them differs; names both sides.
+    """
+    for name, value in (("gains", gains), ("hold_s", hold_s)):
+        expected = getattr(expert, name, value)
+        if expected != value:
+            raise InvalidInputError(
+                f"the expert was made for {name} {expected}, the environment has {value}: make one with both alike"
+            )

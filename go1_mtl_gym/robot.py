@@ -1,8 +1,7 @@
 """The Unitree Go1 as numbers: orders, names, limits and the standing pose.
 
 Every array over joints follows `JOINTS` (leg by leg in the order of `LEGS`; hip, thigh, calf in each leg), every
-array over legs follows `LEGS`. Sources of the figures are named in ``assets/NOTICE.md``. The expert's compiled loops
-hold some of them as constants: after changing one, delete the ``__pycache__`` of ``experts``.
+array over legs follows `LEGS`. Sources of the figures are named in ``assets/NOTICE.md``.
 """
 
 from importlib.resources import files

@@ -1,9 +1,12 @@
-"""Imitation of a Go1 expert: demonstrations, a multi-head policy, behaviour cloning, DAgger and closed-loop evaluation.
+"""Imitation of a Go1 expert: demonstrations, a multi-head policy, behavior cloning, DAgger and closed-loop evaluation.
 
-The package knows environments only by "a Gymnasium environment with a method ``expert_action``"; it never imports an
-expert. Names are resolved on first use, so that a worker that only collects demonstrations does not load torch.
+The package knows environments only by "a Gymnasium environment with a method ``expert_action`` and a ``contract``"; it
+never imports an expert. Names are resolved on first use, so that a worker that only collects demonstrations does not
+load torch. The sub-packages stand in the order of the data: `trainers.data`, `policies`, `evaluation`, `algorithms`,
+`pipeline`.
 """
 
+import warnings
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +16,7 @@ if TYPE_CHECKING:
     from trainers.algorithms.dagger import DAggerConfig, DAggerTrainer
     from trainers.algorithms.dagger_collector import BlockCollector
     from trainers.algorithms.losses import MultiTaskLoss
+    from trainers.algorithms.phase_free import PhaseConfig, train_phase, train_phase_free
     from trainers.data.batches import TensorBatches
     from trainers.data.collection import CollectJob, ShardMismatchError, collect, collect_all, watch
     from trainers.data.demonstrations import Demonstrations
@@ -23,11 +27,12 @@ if TYPE_CHECKING:
     from trainers.evaluation.metrics import offline_metrics
     from trainers.evaluation.scoring import ClosedLoopResult, EpisodeRecord
     from trainers.evaluation.video import record_frames, save_gif, tile
-    from trainers.policies.checkpoint import CheckpointError, load
+    from trainers.policies.checkpoint import CheckpointError
     from trainers.policies.expert_policy import ExpertPolicy
+    from trainers.policies.loading import load
     from trainers.policies.multi_head import MultiHeadPolicy
-    from trainers.policies.phase_estimator import PhaseConfig, PhaseEstimator, phase_errors, train_phase
-    from trainers.policies.phase_free import PhaseFreePolicy, train_phase_free
+    from trainers.policies.phase_estimator import PhaseEstimator, phase_errors
+    from trainers.policies.phase_free import PhaseFreePolicy
     from trainers.policies.pretrained import load_pretrained
     from trainers.policies.stateful import Learner
     from trainers.utils.logging import log_figure, log_round, log_text, make_logger
@@ -39,7 +44,6 @@ _HOME = {
     "BCTrainer": "algorithms.bc",
     "BlockCollector": "algorithms.dagger_collector",
     "CheckpointError": "policies.checkpoint",
-    "PhaseFreePolicy": "policies.phase_free",
     "ClosedLoopResult": "evaluation.scoring",
     "CollectJob": "data.collection",
     "DAggerConfig": "algorithms.dagger",
@@ -51,8 +55,9 @@ _HOME = {
     "MultiHeadPolicy": "policies.multi_head",
     "MultiTaskLoss": "algorithms.losses",
     "PerturbationConfig": "data.environments",
-    "PhaseConfig": "policies.phase_estimator",
+    "PhaseConfig": "algorithms.phase_free",
     "PhaseEstimator": "policies.phase_estimator",
+    "PhaseFreePolicy": "policies.phase_free",
     "ShardMismatchError": "data.collection",
     "TensorBatches": "data.batches",
     "closest_task": "algorithms.add_task",
@@ -62,8 +67,7 @@ _HOME = {
     "evaluate_transition": "evaluation.gait_transitions",
     "joint_target_figure": "evaluation.figures",
     "learn_task": "algorithms.add_task",
-    "train_phase_free": "policies.phase_free",
-    "load": "policies.checkpoint",
+    "load": "policies.loading",
     "load_pretrained": "policies.pretrained",
     "log_figure": "utils.logging",
     "log_round": "utils.logging",
@@ -79,63 +83,25 @@ _HOME = {
     "save_gif": "evaluation.video",
     "tile": "evaluation.video",
     "train_bc": "algorithms.bc",
-    "train_phase": "policies.phase_estimator",
+    "train_phase": "algorithms.phase_free",
+    "train_phase_free": "algorithms.phase_free",
     "watch": "data.collection",
 }
+_RENAMED = {
+    "ClocklessPolicy": "PhaseFreePolicy",
+    "evaluate_switch": "evaluate_transition",
+    "learn_without_clock": "train_phase_free",
+}
+"""Names of version 0.1, which go in 0.3."""
 
-__all__ = [
-    "BCConfig",
-    "BCHistory",
-    "BCTrainer",
-    "BlockCollector",
-    "CheckpointError",
-    "PhaseFreePolicy",
-    "ClosedLoopResult",
-    "CollectJob",
-    "DAggerConfig",
-    "DAggerTrainer",
-    "Demonstrations",
-    "EpisodeRecord",
-    "ExpertPolicy",
-    "Learner",
-    "MultiHeadPolicy",
-    "MultiTaskLoss",
-    "PerturbationConfig",
-    "PhaseConfig",
-    "PhaseEstimator",
-    "ShardMismatchError",
-    "TensorBatches",
-    "closest_task",
-    "collect",
-    "collect_all",
-    "evaluate",
-    "evaluate_transition",
-    "joint_target_figure",
-    "learn_task",
-    "train_phase_free",
-    "load",
-    "load_pretrained",
-    "log_figure",
-    "log_round",
-    "log_text",
-    "make_env",
-    "make_logger",
-    "make_venv",
-    "offline_metrics",
-    "paper_table",
-    "phase_errors",
-    "record_frames",
-    "results_table",
-    "save_gif",
-    "tile",
-    "train_bc",
-    "train_phase",
-    "watch",
-]
+__all__ = sorted(_HOME)
 
 
 def __getattr__(name: str) -> Any:
     """Import a public name from the file that holds it."""
+    if name in _RENAMED:
+        warnings.warn(f"trainers.{name} is now trainers.{_RENAMED[name]}", DeprecationWarning, stacklevel=2)
+        return __getattr__(_RENAMED[name])
     if name not in _HOME:
         raise AttributeError(f"module 'trainers' has no attribute {name!r}; it has {', '.join(__all__)}")
     value = getattr(import_module(f"trainers.{_HOME[name]}"), name)

@@ -7,8 +7,8 @@ import numpy as np
 
 from expert_report.lab import Lab, generator
 from experts import NMPCExpert
-from experts.model import RobotModel
-from experts.phase import fit_phase
+from experts.phase_fitting import fit_phase
+from experts.robot_model import RobotModel
 from go1_mtl_gym import TASKS
 from go1_mtl_gym.sensing.state import RobotState
 

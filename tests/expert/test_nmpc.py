@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from experts import NMPCConfig, NMPCExpert
-from experts.dynamics import FORCE_UNIT
-from experts.mpc import Solution
+from experts.mpc.controller import Solution
+from experts.mpc.srbd import FORCE_UNIT
 from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PDGains
 from go1_mtl_gym.errors import InvalidInputError

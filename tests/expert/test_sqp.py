@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from experts import NMPCConfig, NMPCExpert, nmpc
-from experts.dynamics import COM, RPY
+from experts.mpc.srbd import COM, RPY
 from experts.nmpc import WHOLE_BODY
 from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.sensing.state import RobotState

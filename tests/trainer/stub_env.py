@@ -1,6 +1,6 @@
 """A Go1 without physics: same names and spaces as `Go1Env`, an expert that is linear in the observation.
 
-The action's meaning is made up so that tests can script behaviour: hips 0, 3, 6 set the base velocity (vx, vy, yaw
+The action's meaning is made up so that tests can script behavior: hips 0, 3, 6 set the base velocity (vx, vy, yaw
 rate), a thigh above 0.5 lifts its leg, the first knee above 0.95 makes the robot fall. Joints lag behind.
 """
 
@@ -11,8 +11,8 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from go1_mtl_gym import PAPER_TASKS, TASKS, PerturbationWrapper, Task
-from go1_mtl_gym.actuation import ActionMap
+from go1_mtl_gym import PAPER_TASKS, TASKS, PerturbationWrapper, PolicyContract, Task
+from go1_mtl_gym.actuation import ActionMap, PDGains
 from go1_mtl_gym.sensing.observation import FRAME_SIZE, ObservationLayout
 from trainers.data.environments import ExpertAccess, PerturbationConfig
 
@@ -60,6 +60,8 @@ class StubEnv(gymnasium.Env):
         self.observation_space = gymnasium.spaces.Box(-50, 50, (self.layout.size,), np.float32)
         self.action_space = gymnasium.spaces.Box(-1, 1, (12,), np.float32)
         self.action_map = ActionMap(center=np.tile([0.0, 0.9, -1.8], 4), half_range=np.linspace(0.5, 1.6, 12))
+        gaits = [TASKS[name].gait for name in self.tasks]
+        self.contract = PolicyContract.of_environment(self.layout, gaits, control_hz, PDGains(), self.action_map)
         self.falls_after = expert_falls_after_s
         self.episode_steps = round(episode_s * control_hz)
         self.asked = 0

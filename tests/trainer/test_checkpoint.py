@@ -1,5 +1,6 @@
 """Policies on disk."""
 
+import dataclasses
 import json
 import zipfile
 
@@ -8,6 +9,7 @@ import pytest
 import torch
 
 import trainers
+from go1_mtl_gym import SensorNoise
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
 from tests.trainer.stub_env import StubEnv
 from tests.trainer.test_phase_free import rows
@@ -20,19 +22,19 @@ from trainers.policies.phase_free import phase_free_layout
 def saved(policy, tmp_path):
     """A policy with fitted normalisation, and the file it was saved to."""
     policy.fit_normalization(observations([0, 1, 2, 3] * 20), np.random.default_rng(0).uniform(-1, 1, (80, 12)))
-    policy.env_kwargs = {"tasks": ("trot", "bound"), "channels": ("command",), "history": 1, "kp": 50.0}
+    policy.extra_env_kwargs = {"friction": 0.7, "noise": True}
     path = tmp_path / "deep" / "policy.zip"
     policy.save(path)
     return policy, path
 
 
 @pytest.fixture
-def phase_free(student, tmp_path):
+def phase_free(policy, tmp_path):
     """A phase_free policy whose estimator has learned a normalisation, and the file it was saved to."""
-    estimator = PhaseEstimator(phase_free_layout(student, 3), width=16, seed=5)
+    estimator = PhaseEstimator(phase_free_layout(policy, 3), width=16, seed=5)
     rng = np.random.default_rng(1)
     estimator.normalizer.set(rng.normal(size=estimator.layout.size), rng.uniform(0.5, 2, estimator.layout.size))
-    policy, path = PhaseFreePolicy(student, estimator, 0.3), tmp_path / "phase_free.zip"
+    policy, path = PhaseFreePolicy(policy, estimator, 0.3), tmp_path / "phase_free.zip"
     policy.save(path)
     return policy, path
 
@@ -42,7 +44,7 @@ def rewrite(path, changes: dict[str, bytes | None], description: dict | None = N
     with zipfile.ZipFile(path) as archive:
         files = {name: archive.read(name) for name in archive.namelist()}
     known = json.loads(files["policy.json"])
-    known["phase_free"] |= description or {}
+    known["policy"]["phase"] |= description or {}
     files |= {"policy.json": json.dumps(known).encode()} | changes
     with zipfile.ZipFile(path, "w") as archive:
         for name, content in files.items():
@@ -66,7 +68,8 @@ def test_round_trip_is_exact(saved, load):
 def test_kwargs_and_infinite_bounds_survive(tmp_path):
     env = StubEnv()
     space = type(env.observation_space)(-np.inf, np.inf, env.observation_space.shape, np.float32)
-    policy = MultiHeadPolicy(space, env.action_space, width=8, pooled=True, normalization="min_max", clip_sd=4.0)
+    kwargs = {"width": 8, "pooled": True, "normalization": "min_max", "clip_sd": 4.0, "log_std_init": -1.5}
+    policy = MultiHeadPolicy(space, env.action_space, contract=env.contract, **kwargs)
     policy.save(tmp_path / "p.zip")
     other = trainers.load(tmp_path / "p.zip")
     assert other.network_kwargs() == policy.network_kwargs()
@@ -83,7 +86,8 @@ def test_file_is_json_and_safetensors(saved):
     with zipfile.ZipFile(saved[1]) as archive:
         assert sorted(archive.namelist()) == ["policy.json", "weights.safetensors"]
         description = json.loads(archive.read("policy.json"))
-    assert description["versions"]["torch"] and description["network"]["width"] == 32
+    assert description["versions"]["torch"] and description["policy"]["network"]["width"] == 32
+    assert description["policy"]["contract"]["terms"][0]["unit"] == "m/s^2"
 
 
 def test_failed_save_leaves_the_old_file(saved, monkeypatch):
@@ -99,10 +103,11 @@ def test_failed_save_leaves_the_old_file(saved, monkeypatch):
 def test_degrees_of_physics_params_travel_with_the_policy(tmp_path):
     kwargs = {"friction": 0.5, "payload_kg": 1.0, "action_delay_s": 0.01, "estimator_noise": True, "tasks": ("trot",)}
     env = trainers.make_env("trot", **kwargs)
-    policy = MultiHeadPolicy(env.observation_space, env.action_space, width=8, env_kwargs=kwargs)
+    contract = env.unwrapped.contract
+    policy = MultiHeadPolicy(env.observation_space, env.action_space, contract=contract, width=8, env_kwargs=kwargs)
     policy.save(tmp_path / "p.zip")
     again = trainers.load(tmp_path / "p.zip")
-    assert again.env_kwargs == kwargs
+    assert kwargs.items() <= again.env_kwargs.items() and again.contract == contract
     twin = trainers.make_env("trot", **again.env_kwargs)
     env.reset(seed=0), twin.reset(seed=0)
     for _ in range(3):
@@ -111,11 +116,18 @@ def test_degrees_of_physics_params_travel_with_the_policy(tmp_path):
         np.testing.assert_array_equal(env.step(action)[0], twin.step(action)[0])
 
 
-def test_env_kwargs_must_be_json(saved):
-    policy, path = saved
-    policy.env_kwargs = {"tasks": object()}
-    with pytest.raises(InvalidInputError, match="JSON"):
-        policy.save(path)
+def test_what_cannot_be_saved_is_refused_when_the_policy_is_made():
+    env = StubEnv()
+    with pytest.raises(InvalidInputError, match="JSON.*expert is named as"):
+        MultiHeadPolicy(env.observation_space, env.action_space, contract=env.contract, env_kwargs={"expert": object()})
+
+
+def test_numpys_numbers_and_the_environments_dataclasses_can_be_saved(tmp_path):
+    env, kwargs = StubEnv(), {"episode_s": np.float32(2.5), "noise": SensorNoise(q=0.01)}
+    policy = MultiHeadPolicy(env.observation_space, env.action_space, contract=env.contract, width=8, env_kwargs=kwargs)
+    policy.save(tmp_path / "p.zip")
+    again = trainers.load(tmp_path / "p.zip").extra_env_kwargs
+    assert again == {"episode_s": 2.5, "noise": dataclasses.asdict(SensorNoise(q=0.01))}
 
 
 def test_missing_truncated_and_foreign_files(saved, tmp_path):
@@ -135,14 +147,16 @@ def test_missing_truncated_and_foreign_files(saved, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "change", [{"format": "x"}, {"format_version": 99}, {"network": {"width": 31}}, {"network": {"rm": 1}}]
+    "change",
+    [{"format": "x"}, {"format_version": 99}, {"kind": "x"}, {"network": {"width": 31}}, {"network": {"rm": 1}}],
 )
 def test_inconsistent_description(saved, tmp_path, change):
     with zipfile.ZipFile(saved[1]) as archive:
         description = json.loads(archive.read("policy.json"))
         weights = archive.read("weights.safetensors")
     for name, value in change.items():
-        description[name] = {**description[name], **value} if isinstance(value, dict) else value
+        place = description["policy"] if isinstance(value, dict) else description
+        place[name] = {**place[name], **value} if isinstance(value, dict) else value
     with zipfile.ZipFile(tmp_path / "p.zip", "w") as archive:
         archive.writestr("policy.json", json.dumps(description))
         archive.writestr("weights.safetensors", weights)
@@ -172,16 +186,28 @@ def test_a_phase_free_file_is_json_and_safetensors_and_saves_to_the_same_bytes(p
     with zipfile.ZipFile(phase_free[1]) as archive:
         assert sorted(archive.namelist()) == ["phase.safetensors", "policy.json", "weights.safetensors"]
         first = {name: archive.read(name) for name in archive.namelist()}
-    assert json.loads(first["policy.json"])["phase_free"] == {"history": 3, "width": 16, "correction": 0.3}
+    assert json.loads(first["policy.json"])["policy"]["phase"] == {"history": 3, "width": 16, "correction": 0.3}
     trainers.load(phase_free[1]).save(tmp_path / "again.zip")
     with zipfile.ZipFile(tmp_path / "again.zip") as archive:
         assert first == {name: archive.read(name) for name in archive.namelist()}
 
 
-def test_a_file_of_the_other_class_says_what_it_holds(phase_free, saved):
-    with pytest.raises(trainers.CheckpointError, match="holds a PhaseFreePolicy, a MultiHeadPolicy was expected"):
+@pytest.mark.parametrize("device", ["auto", "cuda:99", 3.5, None])
+def test_a_device_that_is_none_is_refused(saved, device):
+    with pytest.raises(InvalidInputError, match="device must be one that torch has"):
+        trainers.load(saved[1], device)
+
+
+@pytest.mark.parametrize("path", [b"policy.zip", None, 3])
+def test_a_path_that_is_none_is_refused(path):
+    with pytest.raises(InvalidInputError, match="path must be"):
+        trainers.load(path)
+
+
+def test_a_file_of_the_other_kind_says_what_it_holds(phase_free, saved):
+    with pytest.raises(trainers.CheckpointError, match="holds a phase_free policy, a multi_head one was expected"):
         MultiHeadPolicy.load(phase_free[1])
-    with pytest.raises(trainers.CheckpointError, match="holds a MultiHeadPolicy, a PhaseFreePolicy was expected"):
+    with pytest.raises(trainers.CheckpointError, match="holds a multi_head policy, a phase_free one was expected"):
         PhaseFreePolicy.load(saved[1])
 
 

@@ -94,6 +94,7 @@ class Driver:
 
     def __init__(self, falls_after: float = 1.0, **env_kwargs) -> None:
         self.falls_after, self.env_kwargs = falls_after, env_kwargs
+        self.contract = StubEnv(**env_kwargs).contract
 
     def predict(self, obs, deterministic=False):
         assert obs.shape == (SIZE + 4,) and deterministic
@@ -111,24 +112,25 @@ def test_watching_records_what_the_driver_saw_and_did_and_asks_no_expert():
         made.append(make_stub(*args, **kwargs))
         return made[-1]
 
-    rows, layout = watch(Driver(control_hz=100), "trot", 5, 2.0, PerturbationConfig(), 3, make_env=make)
+    rows = watch(Driver(control_hz=100), "trot", 5, 2.0, PerturbationConfig(), 3, make_env=make)
     assert len(rows) == 200 and rows.control_hz == 100 and made[0].unwrapped.asked == 0
-    assert layout.history == 3 and rows.obs.shape[1] == layout.size == SIZE + 2 * 34 + 4
-    np.testing.assert_allclose(rows.acts[:, 1], 0.5 * rows.obs[:, layout.slices["phase"]][:, 0], atol=1e-7)
-    executed = rows.obs[1:, layout.slices["last_action"]]
+    slices = rows.contract.slices
+    assert rows.contract.history == 3 and rows.obs.shape[1] == SIZE + 2 * 34 + 4
+    np.testing.assert_allclose(rows.acts[:, 1], 0.5 * rows.obs[:, slices["phase"]][:, 0], atol=1e-7)
+    executed = rows.obs[1:, slices["last_action"]]
     assert 0.0 < np.abs(executed - rows.acts[:-1]).max() < 0.5, "the world adds its noise to what the driver wants"
-    older = rows.obs[:, layout.slices["history"]]
+    older = rows.obs[:, slices["history"]]
     np.testing.assert_array_equal(older[2:], np.hstack([rows.obs[1:-1, :34], rows.obs[:-2, :34]]))
 
 
 def test_watching_is_a_pure_function_of_its_arguments():
-    one, same, other = (watch(Driver(), "jump", seed, 1.0, make_env=make_stub)[0].obs for seed in (7, 7, 8))
+    one, same, other = (watch(Driver(), "jump", seed, 1.0, make_env=make_stub).obs for seed in (7, 7, 8))
     np.testing.assert_array_equal(one, same)
     assert not np.array_equal(one, other)
 
 
 def test_a_driver_that_falls_is_watched_until_shortly_before():
-    rows, _ = watch(Driver(falls_after=0.93), "trot", 0, 1.0, make_env=make_stub)
+    rows = watch(Driver(falls_after=0.93), "trot", 0, 1.0, make_env=make_stub)
     lengths = [episode.stop - episode.start for episode in rows.episodes()]
     assert set(lengths[:-1]) == {8} and sum(lengths) == 50  # 20 rows up to phase .95, less 12
     with pytest.raises(CollectionError, match="keeps falling"):
@@ -136,10 +138,15 @@ def test_a_driver_that_falls_is_watched_until_shortly_before():
 
 
 def test_watching_refuses_a_driver_of_several_frames_and_no_time():
-    with pytest.raises(InvalidInputError, match="one of 3"):
+    with pytest.raises(InvalidInputError, match="one frame .*got 3"):
         watch(Driver(history=3), "trot", make_env=make_stub)
     with pytest.raises(InvalidInputError, match="seconds > 0"):
         watch(Driver(), "trot", 0, 0.0, make_env=make_stub)
+
+
+def test_watching_refuses_a_driver_of_another_environment():
+    with pytest.raises(InvalidInputError, match="the policy and the environment do not.*control_hz: 50 against 100"):
+        watch(Driver(), "trot", make_env=make_stub, control_hz=100)
 
 
 def test_expert_that_always_falls():

@@ -1,5 +1,6 @@
 """DAgger rounds on the stub: labels, aggregation, notes, resuming."""
 
+import dataclasses
 import json
 
 import numpy as np
@@ -14,6 +15,7 @@ from trainers import (
     BCConfig,
     DAggerConfig,
     DAggerTrainer,
+    MultiHeadPolicy,
     ShardMismatchError,
     TensorBatches,
     make_logger,
@@ -109,8 +111,30 @@ def test_resume_reuses_finished_parts(demos, policy, tmp_path):
 def test_folder_of_other_settings(venv, demos, policy, tmp_path):
     DAggerTrainer(venv, policy, demos, scratch_dir=tmp_path)
     for other in ({"beta": 0.1}, {"takeover_rad": 0.1}, {"round_weight": 2}):
-        with pytest.raises(ShardMismatchError, match="other settings"):
+        with pytest.raises(ShardMismatchError, match="made with another config;"):
             DAggerTrainer(venv, policy, demos, DAggerConfig(**other), scratch_dir=tmp_path)
+
+
+def test_folder_of_another_base_of_equal_length(venv, demos, policy, tmp_path):
+    DAggerTrainer(venv, policy, demos, scratch_dir=tmp_path)
+    other = dataclasses.replace(demos, acts=demos.acts[::-1])
+    with pytest.raises(ShardMismatchError, match="made with another base;"):
+        DAggerTrainer(venv, policy, other, scratch_dir=tmp_path)
+
+
+def test_other_environments_than_the_bases(demos, policy, tmp_path):
+    venv = DummyVecEnv([lambda: StubEnv("trot", control_hz=100)])
+    with pytest.raises(InvalidInputError, match="the base and the environments do not.*control_hz: 50 against 100"):
+        DAggerTrainer(venv, policy, demos, scratch_dir=tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_another_policy_than_the_bases(venv, demos, tmp_path):
+    for kwargs, message in ({"control_hz": 100}, "control_hz"), ({"tasks": demos.tasks[::-1]}, "tasks"):
+        env = StubEnv(**kwargs)
+        other = MultiHeadPolicy(env.observation_space, env.action_space, contract=env.contract, width=8)
+        with pytest.raises(InvalidInputError, match=message):
+            DAggerTrainer(venv, other, demos, scratch_dir=tmp_path)
 
 
 def test_folder_from_before_an_option_was_there(venv, demos, policy, tmp_path):
@@ -121,9 +145,9 @@ def test_folder_from_before_an_option_was_there(venv, demos, policy, tmp_path):
     del settings["bc_config"]["matmul_precision"], settings["bc_config"]["autocast"]
     path.write_text(json.dumps(settings))
     DAggerTrainer(venv, policy, demos, scratch_dir=tmp_path)
-    with pytest.raises(ShardMismatchError, match="other settings"):
+    with pytest.raises(ShardMismatchError, match="another config"):
         DAggerTrainer(venv, policy, demos, DAggerConfig(round_weight=2), scratch_dir=tmp_path)
-    with pytest.raises(ShardMismatchError, match="other settings"):
+    with pytest.raises(ShardMismatchError, match="another bc_config"):
         DAggerTrainer(venv, policy, demos, bc_config=BCConfig(autocast=True), scratch_dir=tmp_path)
 
 

@@ -5,9 +5,23 @@ import dataclasses
 import numpy as np
 import pytest
 
+from go1_mtl_gym import PolicyContract
+from go1_mtl_gym.contract import ObservationTerm, terms_of
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.sensing.observation import ObservationLayout
 from trainers import Demonstrations
+
+CONTRACT = PolicyContract(
+    tasks=("trot", "bound"),
+    gaits=(),
+    terms=(ObservationTerm("count", 1), ObservationTerm("square", 1)),
+    control_hz=2.0,
+    kp=50.0,
+    kd=2.0,
+    default_q=(0.1, 0.2),
+    action_scale=(1.0, 2.0),
+    joints=("hip", "knee"),
+)
 
 
 def tiny(tasks=(0, 0, 0, 1, 1, 0), starts=(1, 0, 1, 1, 0, 1), **changes) -> Demonstrations:
@@ -17,10 +31,7 @@ def tiny(tasks=(0, 0, 0, 1, 1, 0), starts=(1, 0, 1, 1, 0, 1), **changes) -> Demo
         "obs": np.column_stack([count, count**2, np.eye(2)[list(tasks)]]),
         "acts": np.column_stack([count, -count]),
         "starts": np.array(starts, dtype=bool),
-        "tasks": ("trot", "bound"),
-        "center": np.array([0.1, 0.2]),
-        "half_range": np.array([1.0, 2.0]),
-        "control_hz": 2.0,
+        "contract": CONTRACT,
         "meta": {"kp": 50, "seed": 1},
     }
     return Demonstrations(**(values | changes))
@@ -45,8 +56,9 @@ def test_per_task_keeps_rows_and_marks_gaps():
 def test_concatenate_keeps_what_is_agreed():
     both = Demonstrations.concatenate([tiny(), tiny(meta={"kp": 50, "seed": 2})])
     assert len(both) == 12 and both.starts.sum() == 8 and both.meta == {"kp": 50}
-    with pytest.raises(InvalidInputError, match="differ"):
-        Demonstrations.concatenate([tiny(), tiny(half_range=np.array([1.0, 2.5]))])
+    other = dataclasses.replace(CONTRACT, action_scale=(1.0, 2.5))
+    with pytest.raises(InvalidInputError, match="demonstrations 0 and demonstrations 1 do not belong.*action_scale"):
+        Demonstrations.concatenate([tiny(), tiny(contract=other)])
     with pytest.raises(InvalidInputError, match="empty"):
         Demonstrations.concatenate([])
 
@@ -55,35 +67,50 @@ def wide(layout: ObservationLayout, n: int = 3) -> Demonstrations:
     """Rows whose entry j is j + 1000 times the row, but for the task ids: 0, 1, 0, ..."""
     obs = np.arange(layout.size) + 1000.0 * np.arange(n)[:, None]
     obs[:, -2:] = np.eye(2)[np.arange(n) % 2]
-    return tiny(obs=obs, acts=np.zeros((n, 2)), starts=np.ones(n, dtype=bool))
+    contract = CONTRACT.with_terms(terms_of(layout))
+    return tiny(obs=obs, acts=np.zeros((n, 2)), starts=np.ones(n, dtype=bool), contract=contract)
 
 
-def test_select_what_a_smaller_layout_sees():
-    have = ObservationLayout(("trot", "bound"), ("command", "phase"), history=3)
-    rows = wide(have)
-    seen = rows.select(have, ObservationLayout(rows.tasks, ("phase",), history=2))
+def test_select_the_terms_that_a_smaller_observation_has():
+    rows = wide(ObservationLayout(("trot", "bound"), ("command", "phase"), history=3))
+    seen = rows.select(("phase",), history=2)
     assert seen.obs[1].tolist() == [*range(1000, 1034), 1037, 1038, *range(1039, 1073), 0, 1]
     assert seen.task.tolist() == rows.task.tolist() and seen.meta == rows.meta
-    np.testing.assert_array_equal(rows.select(have, have).obs, rows.obs)
-    literal = rows.select(have, ObservationLayout(rows.tasks))
-    np.testing.assert_array_equal(literal.obs, rows.proprioceptive().obs)
-    assert literal.obs[2].tolist() == [*range(2000, 2034), 1, 0]
+    assert (seen.contract.channels, seen.contract.history) == (("phase",), 2)
+    np.testing.assert_array_equal(rows.select(("phase", "command"), 3).obs, rows.obs)
+    assert rows.select().obs[2].tolist() == [*range(2000, 2034), 1, 0]
 
 
-def test_select_from_another_layout():
-    have = ObservationLayout(("trot", "bound"), ("phase",))
-    for wrong in (ObservationLayout(have.tasks), ObservationLayout(("bound", "trot"), ("phase",))):
-        with pytest.raises(InvalidInputError, match="layout of these rows must have 38 entries"):
-            wide(have).select(wrong, wrong)
-    with pytest.raises(InvalidInputError, match="got also"):
-        wide(have).select(have, ObservationLayout(have.tasks, ("command",)))
+def test_nothing_is_selected_that_is_not_there():
+    rows = wide(ObservationLayout(("trot", "bound"), ("phase",)))
+    with pytest.raises(InvalidInputError, match="got also.*command"):
+        rows.select(("command",))
+    with pytest.raises(InvalidInputError, match="history must be at most 1, got 2"):
+        rows.select(("phase",), 2)
+    with pytest.raises(InvalidInputError, match="not a Go1's: they hold .count 1, square 1"):
+        tiny().select()
 
 
-@pytest.mark.parametrize("columns", [[0, 2], [4, 2, 3], [-1, 2, 3], [[2, 3]], [0.0, 2.0, 3.0], [0, 3, 2], []])
-def test_impossible_columns(columns):
-    assert tiny().take_columns([1, 2, 3]).obs[2].tolist() == [4, 1, 0]
-    with pytest.raises(InvalidInputError, match="columns must"):
-        tiny().take_columns(columns)
+def test_rows_are_brought_into_the_order_of_a_policys_tasks():
+    swapped = tiny().fitted_to(CONTRACT.with_tasks(("bound", "trot")))
+    assert swapped.tasks == ("bound", "trot") and swapped.task.tolist() == [1, 1, 1, 0, 0, 1]
+    assert tiny().fitted_to(CONTRACT.with_tasks(("walk", "bound", "trot"))).task.tolist() == [2, 2, 2, 1, 1, 2]
+    with pytest.raises(InvalidInputError, match="trot"):
+        tiny().fitted_to(CONTRACT.with_tasks(("walk", "bound")))
+    rows = tiny()
+    assert rows.fitted_to(CONTRACT) is rows and rows.fitted_to(None) is rows
+
+
+@pytest.mark.parametrize("change", [{"control_hz": 4.0}, {"kp": 40.0}, {"joints": ("knee", "hip")}])
+def test_rows_of_another_contract_are_refused(change):
+    with pytest.raises(InvalidInputError, match=f"the policy and the demonstrations.*{next(iter(change))}"):
+        tiny().fitted_to(dataclasses.replace(CONTRACT, **change))
+
+
+def test_a_fingerprint_tells_rows_apart_that_have_equal_length():
+    assert tiny().fingerprint() == tiny(meta={}).fingerprint()
+    others = [tiny(acts=np.ones((6, 2))), tiny(contract=dataclasses.replace(CONTRACT, kp=1.0))]
+    assert len({rows.fingerprint() for rows in (tiny(), *others)}) == 3
 
 
 def test_split_holds_out_whole_episodes_of_every_task():
@@ -130,6 +157,13 @@ def test_damaged_missing_and_foreign_files(tmp_path):
             Demonstrations.load(tmp_path / name)
 
 
+def test_a_shard_of_version_0_1_says_why_it_is_refused(tmp_path):
+    manifest = np.frombuffer(b'{"tasks": ["trot"], "control_hz": 50, "rows": 1, "meta": {}}', dtype=np.uint8)
+    np.savez(tmp_path / "old.npz", manifest=manifest, obs=np.ones((1, 3)), acts=np.ones((1, 2)), starts=np.ones(1))
+    with pytest.raises(InvalidInputError, match="version 0.1 and does not say what its numbers mean"):
+        Demonstrations.load(tmp_path / "old.npz")
+
+
 def test_export_to_imitation():
     trajectories = tiny().to_trajectories()
     assert [len(t) for t in trajectories] == [1, 1]
@@ -144,7 +178,7 @@ def test_export_to_imitation():
         {"acts": np.zeros((5, 2))},
         {"starts": np.zeros(6, dtype=bool)},
         {"starts": np.ones(5, dtype=bool)},
-        {"half_range": np.ones(3)},
+        {"contract": dataclasses.replace(CONTRACT, terms=(ObservationTerm("count", 1),))},
         {"obs": np.zeros((6, 2))},
     ],
 )

@@ -29,10 +29,10 @@ QUICK = BCConfig(steps=60, batch_size=128, learning_rate=5e-3, weight_decay=0.1,
 
 
 @pytest.fixture
-def trained(student, demos) -> MultiHeadPolicy:
-    """A student that sees its inputs and outputs normalized."""
-    student.fit_normalization(demos.obs, demos.acts)
-    return student
+def trained(policy, demos) -> MultiHeadPolicy:
+    """A policy that sees its inputs and outputs normalized."""
+    policy.fit_normalization(demos.obs, demos.acts)
+    return policy
 
 
 @pytest.fixture(scope="module")
@@ -124,7 +124,7 @@ def test_the_closest_task_is_the_one_that_already_does_it(trained, pace):
         closest_task(trained, pace.take(np.zeros(0, dtype=int)))
 
 
-def test_who_has_it_or_cannot_have_it_is_told(trained, policy):
+def test_who_has_it_or_cannot_have_it_is_told(trained):
     with pytest.raises(InvalidInputError, match="does not have.*'pace'.*got 'trot'"):
         trained.add_task("trot")
     with pytest.raises(InvalidInputError, match="got 'crawl'"):
@@ -132,12 +132,12 @@ def test_who_has_it_or_cannot_have_it_is_told(trained, policy):
     with pytest.raises(InvalidInputError, match="got 'pace'"):
         trained.add_task("pace").add_task("pace")
     env = StubEnv()
-    pooled = MultiHeadPolicy(env.observation_space, env.action_space, pooled=True, env_kwargs={"tasks": PAPER_TASKS})
+    pooled = MultiHeadPolicy(env.observation_space, env.action_space, contract=env.contract, pooled=True)
     with pytest.raises(InvalidInputError, match="pooled"):
         pooled.add_task("pace")
-    policy.env_kwargs = {"tasks": ("trot", "walk")}
-    with pytest.raises(InvalidInputError, match="4 tasks"):
-        policy.add_task("pace")
+    unnamed = MultiHeadPolicy(env.observation_space, env.action_space, n_tasks=4)
+    with pytest.raises(InvalidInputError, match="its tasks have no names"):
+        unnamed.add_task("pace")
 
 
 def test_a_grown_policy_is_saved_and_rebuilt(trained, tmp_path):
@@ -213,8 +213,12 @@ def test_rows_that_do_not_fit_are_refused(trained, pace):
     grown = trained.add_task("pace")
     with pytest.raises(InvalidInputError, match="hold .*pace"):
         learn_task(trained, pace, QUICK)
-    with pytest.raises(InvalidInputError, match="51 entries.*got 34"):
-        learn_task(grown, pace.proprioceptive(), QUICK)
+    with pytest.raises(InvalidInputError, match="the policy and the demonstrations do not belong.*terms"):
+        learn_task(grown, pace.select(), QUICK)
+    faster = dataclasses.replace(pace, contract=dataclasses.replace(pace.contract, control_hz=100))
+    for use in (lambda: learn_task(grown, faster, QUICK), lambda: closest_task(trained, faster)):
+        with pytest.raises(InvalidInputError, match="control_hz: 50 against 100"):
+            use()
     with pytest.raises(InvalidInputError, match="0 rows"):
         learn_task(grown, pace.take(np.zeros(0, dtype=int)), QUICK)
 

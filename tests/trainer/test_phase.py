@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from go1_mtl_gym import Go1Env
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.sensing.observation import ObservationLayout
 from trainers import Demonstrations, PhaseConfig, PhaseEstimator, phase_errors, train_phase
@@ -14,6 +15,7 @@ from trainers.policies.phase_estimator import CLIP_SD, unit
 TASKS = ("trot", "walk")
 SEEN = ObservationLayout(TASKS, ("command",))
 WHOLE = ObservationLayout(TASKS, ("command", "phase"), 2)
+CONTRACT = Go1Env("trot", tasks=TASKS, channels=WHOLE.channels, history=WHOLE.history).contract
 QUICK = PhaseConfig(steps=300, batch_size=256)
 
 
@@ -28,7 +30,7 @@ def rows(phase: np.ndarray, task: np.ndarray, seed: int = 0) -> Demonstrations:
     obs[:, WHOLE.slices["phase"]] = np.stack([np.sin(2 * np.pi * phase), np.cos(2 * np.pi * phase)], axis=1)
     obs[:, WHOLE.slices["task"]] = np.eye(2)[task]
     starts = np.arange(len(phase)) == 0
-    return Demonstrations(obs, np.zeros((len(phase), 12)), starts, TASKS, np.zeros(12), np.ones(12), 50)
+    return Demonstrations(obs, np.zeros((len(phase), 12)), starts, CONTRACT)
 
 
 def drawn(count: int = 2000, seed: int = 0) -> Demonstrations:
@@ -73,8 +75,8 @@ def test_weights_depend_on_the_seed_alone():
 def test_it_learns_the_phase_of_each_task():
     estimator = PhaseEstimator(SEEN, width=32)
     held_out = drawn(seed=1)
-    train_phase(estimator, drawn(), WHOLE, QUICK)
-    errors = phase_errors(estimator, held_out, WHOLE)
+    train_phase(estimator, drawn(), QUICK)
+    errors = phase_errors(estimator, held_out)
     assert list(errors) == list(TASKS)
     assert all(own["median"] < 0.02 and own["p99"] < 0.1 for own in errors.values()), errors
     q = SEEN.slices["q"].start
@@ -85,7 +87,7 @@ def test_it_learns_the_phase_of_each_task():
 def test_training_is_a_function_of_its_arguments():
     def weights(seed: int) -> torch.Tensor:
         estimator = PhaseEstimator(SEEN, width=8)
-        train_phase(estimator, drawn(100), WHOLE, PhaseConfig(steps=5, seed=seed))
+        train_phase(estimator, drawn(100), PhaseConfig(steps=5, seed=seed))
         return estimator.network[0].weight
 
     before = torch.random.get_rng_state()
@@ -98,7 +100,7 @@ def test_errors_are_counted_the_short_way_round(off, error):
     estimator = Off(SEEN, width=8)
     estimator.off = off
     phase = np.array([0.0, 0.05, 0.3, 0.97])
-    errors = phase_errors(estimator, rows(phase, np.zeros(4, dtype=int)), WHOLE)
+    errors = phase_errors(estimator, rows(phase, np.zeros(4, dtype=int)))
     assert list(errors) == ["trot"], "there are no rows of the walk"
     assert errors["trot"]["median"] == pytest.approx(error, abs=1e-6)
     assert errors["trot"]["p99"] == pytest.approx(error, abs=1e-6)
@@ -108,7 +110,7 @@ def test_median_and_p99_by_hand():
     phase = np.arange(101) / 1000  # errors 0, .001 ... .1 against an answer that stands still
     estimator = Off(SEEN, width=8)
     estimator.estimate = lambda obs: np.tile([0.0, 1.0], (len(obs), 1))
-    errors = phase_errors(estimator, rows(phase, np.zeros(101, dtype=int)), WHOLE)
+    errors = phase_errors(estimator, rows(phase, np.zeros(101, dtype=int)))
     assert errors["trot"] == {"median": pytest.approx(0.05, abs=1e-6), "p99": pytest.approx(0.099, abs=1e-6)}
 
 
@@ -131,13 +133,13 @@ def test_bad_config(figure):
 
 def test_rows_that_do_not_fit_are_refused():
     estimator, known = PhaseEstimator(SEEN, width=8), drawn(10)
-    blind, others = ObservationLayout(TASKS, ("command",), 2), ("trot", "pace")
-    for own, layout, message in (
-        (known.select(WHOLE, blind), blind, "rows with the phase"),
-        (known.take(np.zeros(10, dtype=bool)), WHOLE, "got 0"),
-        (known, ObservationLayout(TASKS, ("command", "phase")), "entries"),
-        (dataclasses.replace(known, tasks=others), ObservationLayout(others, ("command", "phase"), 2), "tasks"),
+    others = dataclasses.replace(known, contract=known.contract.with_tasks(("trot", "pace")))
+    for rows_that_do_not, message in (
+        (known.select(("command",), 2), "rows with the phase"),
+        (known.take(np.zeros(10, dtype=bool)), "got 0"),
+        (known.select(("phase",)), "got also.*command"),
+        (others, "tasks"),
     ):
         for use in (train_phase, phase_errors):
             with pytest.raises(InvalidInputError, match=message):
-                use(estimator, own, layout)
+                use(estimator, rows_that_do_not)

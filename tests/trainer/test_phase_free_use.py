@@ -33,10 +33,10 @@ QUICK = PhaseConfig(steps=400, batch_size=256)
 
 
 @pytest.fixture
-def phase_free(student) -> PhaseFreePolicy:
+def phase_free(policy) -> PhaseFreePolicy:
     """With an untrained estimator, a clock of its own, and a first knee that never makes the stub fall."""
-    student.act_normalizer.scale[2] = 0.0
-    return PhaseFreePolicy(student, PhaseEstimator(phase_free_layout(student, 3), width=16), 0.3)
+    policy.act_normalizer.scale[2] = 0.0
+    return PhaseFreePolicy(policy, PhaseEstimator(phase_free_layout(policy, 3), width=16), 0.3)
 
 
 class Expert(MultiHeadPolicy):
@@ -56,8 +56,7 @@ class Expert(MultiHeadPolicy):
 
 def expert() -> Expert:
     env = StubEnv()
-    kwargs = {"tasks": PAPER_TASKS, "channels": CHANNELS}
-    return Expert(env.observation_space, env.action_space, width=8, env_kwargs=kwargs, seed=0)
+    return Expert(env.observation_space, env.action_space, contract=env.contract, width=8, seed=0)
 
 
 def test_environments_side_by_side_equal_each_alone(phase_free):
@@ -100,10 +99,10 @@ def test_copies_act_alike(phase_free, duplicate):
     np.testing.assert_array_equal(acts, same)
 
 
-def test_it_says_which_environment_it_is_for(phase_free, student):
-    expected = {"control_hz": 50, "tasks": PAPER_TASKS, **BLIND}
+def test_it_says_which_environment_it_is_for(phase_free, policy):
+    expected = {"control_hz": 50, "tasks": PAPER_TASKS, "kp": 50.0, "kd": 2.0, **BLIND}
     assert phase_free.env_kwargs == expected
-    assert phase_free.action_space == student.action_space and student.env_kwargs["channels"] == CHANNELS
+    assert phase_free.action_space == policy.action_space and policy.env_kwargs["channels"] == CHANNELS
 
 
 # -- Learning ----------------------------------------------------------------------------------------------------------
@@ -115,8 +114,8 @@ def test_it_learns_to_walk_without_the_clock():
     policy = train_phase_free(teacher, 20.0, 3, config=QUICK, make_env=make_stub)
     assert torch.equal(torch.random.get_rng_state(), generator)
     assert policy.correction == 1.0 and policy.estimator.layout.history == 3
-    held_out, layout = watch(teacher, "trot", 77, 5.0, history=3, make_env=make_stub)
-    assert phase_errors(policy.estimator, held_out, layout)["trot"]["median"] < 0.02
+    held_out = watch(teacher, "trot", 77, 5.0, history=3, make_env=make_stub)
+    assert phase_errors(policy.estimator, held_out)["trot"]["median"] < 0.02
     result = evaluate(policy, "trot", 1, 4.0, commands=[(0.5, 0.0, 0.0)], make_env=make_stub)
     assert result.step_rate == pytest.approx(2.5, rel=0.1), "the stub lifts its legs in turn only if it knows the phase"
 
@@ -136,7 +135,7 @@ def test_long_walks_are_cut_into_episodes_of_their_own_seeds(monkeypatch):
         walks.append((task, seed, seconds, perturbation, kwargs["friction"]))
         return watch(policy, task, seed, 0.1, perturbation, history, make_env=kwargs["make_env"])
 
-    monkeypatch.setattr("trainers.policies.phase_free.watch", record)
+    monkeypatch.setattr("trainers.algorithms.phase_free.watch", record)
     train_phase_free(expert(), 75.0, 2, config=PhaseConfig(steps=1), make_env=make_stub, friction=0.5)
     assert [walk[0] for walk in walks] == list(PAPER_TASKS) * 3
     assert {walk[2:] for walk in walks} == {(25.0, PerturbationConfig(), 0.5)} and len({walk[1] for walk in walks}) == 3
@@ -152,9 +151,9 @@ def test_learning_refuses_impossible_arguments(arguments):
 
 
 @pytest.mark.parametrize("correction", [0.0, -0.1, 1.1, np.nan])
-def test_bad_correction(student, correction):
+def test_bad_correction(policy, correction):
     with pytest.raises(InvalidInputError, match="correction must lie in"):
-        PhaseFreePolicy(student, PhaseEstimator(phase_free_layout(student, 1), width=8), correction)
+        PhaseFreePolicy(policy, PhaseEstimator(phase_free_layout(policy, 1), width=8), correction)
 
 
 @pytest.mark.parametrize(
@@ -165,10 +164,10 @@ def test_bad_correction(student, correction):
         (PAPER_TASKS, ("command", "gravity", "last_action"), "gravity"),
     ],
 )
-def test_an_estimator_of_something_else(student, tasks, channels, message):
+def test_an_estimator_of_something_else(policy, tasks, channels, message):
     estimator = PhaseEstimator(ObservationLayout(tasks, channels), width=8)
     with pytest.raises(InvalidInputError, match=message):
-        PhaseFreePolicy(student, estimator)
+        PhaseFreePolicy(policy, estimator)
 
 
 @pytest.mark.parametrize(
@@ -177,24 +176,24 @@ def test_an_estimator_of_something_else(student, tasks, channels, message):
         ({"channels": ("command", "last_action")}, "must see command, phase"),
         ({"channels": ("phase",)}, "must see command, phase"),
         ({"history": 2}, "one frame"),
-        ({"channels": ("command", "phase", "gravity")}, "has|have"),
     ],
 )
-def test_a_student_that_sees_something_else(kwargs, message):
-    student = expert()
-    student.env_kwargs |= kwargs
-    layout = ObservationLayout(PAPER_TASKS, student.env_kwargs["channels"], student.env_kwargs.get("history", 1))
-    if "gravity" not in layout.channels:
-        student.observation_space = type(student.observation_space)(-1, 1, (layout.size,), np.float32)
+def test_a_policy_that_sees_something_else(kwargs, message):
+    env = StubEnv(**{"channels": CHANNELS, **kwargs})
+    other = MultiHeadPolicy(env.observation_space, env.action_space, contract=env.contract, width=8)
     with pytest.raises(InvalidInputError, match=message):
-        PhaseFreePolicy(student, PhaseEstimator(phase_free_layout(student, 1), width=8))
+        PhaseFreePolicy(other, PhaseEstimator(phase_free_layout(other, 1), width=8))
 
 
-def test_a_task_that_is_not_registered():
-    student = expert()
-    student.env_kwargs["tasks"] = ("trot", "jump", "bound", "crawl")
-    with pytest.raises(InvalidInputError, match="crawl"):
-        PhaseFreePolicy(student, PhaseEstimator(phase_free_layout(student, 1), width=8))
+def test_a_policy_without_a_contract_or_without_gaits():
+    env = StubEnv()
+    unnamed = MultiHeadPolicy(env.observation_space, env.action_space, n_tasks=4, width=8)
+    with pytest.raises(InvalidInputError, match="with a contract was expected"):
+        phase_free_layout(unnamed, 1)
+    contract = env.contract.with_tasks(("trot", "jump", "bound", "crawl"))
+    crawling = MultiHeadPolicy(env.observation_space, env.action_space, contract=contract, width=8)
+    with pytest.raises(InvalidInputError, match="names the gaits"):
+        PhaseFreePolicy(crawling, PhaseEstimator(phase_free_layout(crawling, 1), width=8))
 
 
 def test_observations_that_are_none(phase_free):

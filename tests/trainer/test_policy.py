@@ -9,7 +9,7 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.evaluation import evaluate_policy
 
-from go1_mtl_gym import TASKS
+from go1_mtl_gym import Go1Env
 from go1_mtl_gym.errors import InvalidInputError
 from tests.trainer.stub_env import SIZE, StubEnv
 from trainers import MultiHeadPolicy
@@ -144,17 +144,45 @@ def test_seed_fixes_weights_and_spares_the_global_generator():
     torch.manual_seed(5)
     expected = torch.rand(1)
     torch.manual_seed(5)
-    a, b = (MultiHeadPolicy(env.observation_space, env.action_space, width=8, seed=1) for _ in range(2))
+    a, b = (MultiHeadPolicy(env.observation_space, env.action_space, n_tasks=4, width=8, seed=1) for _ in range(2))
     assert torch.equal(torch.rand(1), expected)
     assert all(torch.equal(p, q) for p, q in zip(a.parameters(), b.parameters()))
 
 
-def test_heads_are_those_of_the_tasks_named_or_of_all_tasks():
+def test_heads_are_those_of_the_contracts_tasks():
     env = StubEnv(tasks=("trot", "walk"))
-    named = MultiHeadPolicy(env.observation_space, env.action_space, env_kwargs={"tasks": ["trot", "walk"]})
-    assert named.n_tasks == 2 and named.env_kwargs == {"tasks": ("trot", "walk")}
-    every = MultiHeadPolicy(env.observation_space, env.action_space)
-    assert every.n_tasks == len(TASKS) and every.env_kwargs == {"tasks": tuple(TASKS)}, "a later task is not its own"
+    policy = MultiHeadPolicy(env.observation_space, env.action_space, contract=env.contract)
+    assert policy.n_tasks == 2 and policy.tasks == ("trot", "walk") and policy.env_kwargs["tasks"] == ("trot", "walk")
+
+
+def test_a_contract_is_not_to_be_forgotten_and_must_fit():
+    env, other = StubEnv(), StubEnv(tasks=("trot", "walk"))
+    with pytest.raises(InvalidInputError, match="policy_kwargs={'contract': env.unwrapped.contract}"):
+        MultiHeadPolicy(env.observation_space, env.action_space)
+    with pytest.raises(InvalidInputError, match="by the contract .*trot, walk"):
+        MultiHeadPolicy(env.observation_space, env.action_space, contract=other.contract)
+    with pytest.raises(InvalidInputError, match="by the contract"):
+        MultiHeadPolicy(env.observation_space, env.action_space, contract=env.contract, n_tasks=3)
+
+
+def test_an_observation_of_another_environment_is_refused_with_the_one_that_is_meant(policy):
+    for shape in ((40,), (3, 56), (2, 2, 55), ()):
+        with pytest.raises(InvalidInputError, match=r"task id of trot, bound, jump, walk; policy.make_env\(\) makes"):
+            policy.predict(np.zeros(shape, dtype=np.float32))
+
+
+def test_a_policy_makes_its_environment():
+    env = Go1Env("trot", tasks=("trot", "walk"), channels=("command",), control_hz=100, noise=True)
+    policy = MultiHeadPolicy(
+        env.observation_space, env.action_space, contract=env.contract, env_kwargs={"friction": 0.5}, width=8
+    )
+    made = policy.make_env("walk", episode_s=2.0)
+    assert made.unwrapped.contract == env.contract and made.unwrapped.physics_params.friction == 0.5
+    assert policy.make_env().reset(seed=0)[1]["task"] in ("trot", "walk")
+    with pytest.raises(InvalidInputError, match="task must be one of 'trot', 'walk'; got 'jump'"):
+        policy.make_env("jump")
+    with pytest.raises(InvalidInputError, match="the policy and the environment do not belong together: kp"):
+        policy.make_env("walk", kp=40.0)
 
 
 def test_copies_predict_the_same(policy):
@@ -177,7 +205,7 @@ def test_exploration_is_small_gaussian_and_clipped(policy):
     actions = policy.predict(np.repeat(observations([0]), 2000, axis=0))[0]
     assert np.abs(actions).max() <= 1.0
     stddev = policy.get_distribution(torch.from_numpy(observations([0]))).distribution.stddev
-    np.testing.assert_allclose(stddev.detach(), np.exp(-1.0), rtol=1e-5)
+    np.testing.assert_allclose(stddev.detach(), np.exp(-3.5), rtol=1e-5)
 
 
 def test_ppo_learns_saves_and_loads(venv, tmp_path):

@@ -8,7 +8,6 @@ import trainers
 from go1_mtl_gym import PAPER_TASKS
 from go1_mtl_gym.errors import InvalidInputError
 from trainers import MultiHeadPolicy, PhaseFreePolicy
-from trainers.policies import pretrained
 from trainers.policies.pretrained import FOLDER, PRETRAINED
 
 LARGEST_BYTES = 5_000_000
@@ -17,16 +16,10 @@ CLASSES = {"clocked": MultiHeadPolicy, "phase_free": PhaseFreePolicy}
 EVERY = pytest.mark.parametrize("name", PRETRAINED)
 
 
-def test_unknown_names_are_refused_with_a_list_of_what_is_there(student, tmp_path, monkeypatch):
-    monkeypatch.setattr(pretrained, "FOLDER", tmp_path)
-    with pytest.raises(InvalidInputError, match=r"are \[\], got 'clocked'"):
-        trainers.load_pretrained()
-    for name in ("phase_free", "other"):
-        student.save(tmp_path / f"{name}.zip")
-    for name in ("clocked", "other", "../phase_free", "phase_free.zip", None):
-        with pytest.raises(InvalidInputError, match=r"are \['phase_free'\], got"):
-            trainers.load_pretrained(name)
-    assert isinstance(trainers.load_pretrained("phase_free"), MultiHeadPolicy)
+@pytest.mark.parametrize("name", ["other", "../phase_free", "phase_free.zip", None, "clockless"])
+def test_unknown_names_are_refused_with_a_list_of_those_there(name):
+    with pytest.raises(InvalidInputError, match="must be one of 'clocked', 'phase_free'; got"):
+        trainers.load_pretrained(name)
 
 
 def test_the_files_are_those_named_and_small():

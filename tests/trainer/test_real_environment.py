@@ -42,7 +42,7 @@ def test_clone_correct_save_and_evaluate(tmp_path):
     kwargs = KWARGS | {"tasks": tasks}
     demos = Demonstrations.concatenate([collect(task, seed=0, seconds=2.0, env_kwargs=kwargs) for task in tasks])
     venv = make_venv(tasks, env_kwargs=kwargs)
-    policy = MultiHeadPolicy(venv.observation_space, venv.action_space, width=32, n_tasks=2, env_kwargs=kwargs)
+    policy = MultiHeadPolicy(venv.observation_space, venv.action_space, contract=demos.contract, width=32)
     config = BCConfig(steps=60, batch_size=64)
     history = train_bc(policy, demos, config, validation=demos)
     assert history.r2["trot"][-1] > 0.5

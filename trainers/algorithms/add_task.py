@@ -1,7 +1,6 @@
 """New gaits for a trained student: one more head, which learns alone or together with the rest."""
 
 import dataclasses
-from typing import Any
 
 import numpy as np
 import torch
@@ -9,43 +8,12 @@ from gymnasium import spaces
 from imitation.util.logger import HierarchicalLogger
 from torch import nn
 
-from go1_mtl_gym import TASKS
+from go1_mtl_gym.contract import ObservationTerm, PolicyContract
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.validation import one_of
 from trainers.algorithms.bc import BCConfig, BCHistory, train_bc
 from trainers.data.demonstrations import Demonstrations
 from trainers.evaluation.metrics import BATCH, offline_metrics
 from trainers.policies.multi_head import MultiHeadPolicy
-
-CRITIC_INPUT = "critic.0.weight"
-"""Weights of the critic's first layer, shape (units, D): the one-hot task id is its last columns."""
-
-
-def add_task(policy: MultiHeadPolicy, name: str, seed: int = 0, like: str | None = None) -> MultiHeadPolicy:
-    """A copy of a policy with one more task; see `trainers.MultiHeadPolicy.add_task`."""
-    tasks = tasks_of(policy)
-    if policy.pooled:
-        raise InvalidInputError(f"a policy with a head per task was expected, got a pooled one; it cannot add {name!r}")
-    one_of(name, [task for task in TASKS if task not in tasks], "a task that the policy does not have")
-    space = policy.observation_space
-    grown = MultiHeadPolicy(
-        **policy._get_constructor_parameters()
-        | {
-            "observation_space": spaces.Box(np.append(space.low, np.float32(0)), np.append(space.high, np.float32(1))),
-            "n_tasks": policy.n_tasks + 1,
-            "env_kwargs": policy.env_kwargs | {"tasks": (*tasks, name)},
-            "seed": seed,
-        }
-    ).to(policy.device)
-    kept = policy.state_dict()
-    kept[CRITIC_INPUT] = nn.functional.pad(kept[CRITIC_INPUT], (0, 1))
-    grown.load_state_dict(grown.state_dict() | kept)
-    if like is not None:
-        own = policy.actor.heads[tasks.index(one_of(like, tasks, "like"))]
-        grown.actor.heads[-1].load_state_dict(own.state_dict())
-    grown.seed = None  # no seed gives these weights
-    grown.set_training_mode(policy.training)
-    return grown
 
 
 def learn_task(
@@ -78,8 +46,8 @@ def learn_task(
         Losses and held-out R2 over the steps.
 
     Raises:
-        InvalidInputError: if there are no rows, the policy is pooled or does not have their tasks, or observations have
-            another size.
+        InvalidInputError: if there are no rows, the policy is pooled or does not have their tasks, or their contracts
+            differ in anything else.
     """
     if policy.pooled or not len(dataset):
         kind = "pooled policy" if policy.pooled else "policy with heads"
@@ -88,12 +56,10 @@ def learn_task(
     if rehearsal is None:
         names = tuple(dataset.per_task())
         rows = trunk_features(policy, dataset).with_tasks(names)
-        own = None if validation is None else trunk_features(policy, validation).with_tasks(names)
-        return train_bc(_heads_alone(policy, names), rows, config, own, **more)
-    tasks = tasks_of(policy)
-    rows = Demonstrations.concatenate([dataset.with_tasks(tasks), rehearsal.with_tasks(tasks)])
-    own = None if validation is None else validation.with_tasks(tasks)
-    return train_bc(policy, rows, config, own, **more)
+        held_out = None if validation is None else trunk_features(policy, validation).with_tasks(names)
+        return train_bc(_heads_alone(policy, names, rows.contract), rows, config, held_out, **more)
+    rows = Demonstrations.concatenate([each.fitted_to(policy.contract) for each in (dataset, rehearsal)])
+    return train_bc(policy, rows, config, validation, **more)
 
 
 def closest_task(policy: MultiHeadPolicy, dataset: Demonstrations) -> str:
@@ -104,29 +70,30 @@ def closest_task(policy: MultiHeadPolicy, dataset: Demonstrations) -> str:
         dataset: rows of the other task; their task id does not matter.
 
     Raises:
-        InvalidInputError: if there are no rows, or their observations do not fit the policy's.
+        InvalidInputError: if there are no rows, or their contract differs from the policy's in more than the tasks.
     """
-    tasks, (seen, _) = tasks_of(policy), np.split(dataset.obs, [-len(dataset.tasks)], axis=1)
+    contract = _named(policy)
+    contract.check(dataset.contract, "the policy", "the demonstrations", ignore=("tasks",))
+    tasks, (seen, _) = contract.tasks, np.split(dataset.obs, [-len(dataset.tasks)], axis=1)
     errors = {}
     for name in tasks:
         as_if = np.tile(np.eye(len(tasks), dtype=np.float32)[tasks.index(name)], (len(seen), 1))
-        rows = dataclasses.replace(dataset, obs=np.hstack([seen, as_if]), tasks=tasks)
-        errors |= {own: scores["mse"] for own, scores in offline_metrics(policy, rows).items()}
+        rows = dataclasses.replace(dataset, obs=np.hstack([seen, as_if]), contract=contract)
+        errors |= {task: scores["mse"] for task, scores in offline_metrics(policy, rows).items()}
     if not errors:
         raise InvalidInputError("rows of the new task were expected, got none")
     return min(errors, key=errors.__getitem__)
 
 
-def tasks_of(policy: Any) -> tuple[str, ...]:
-    """Names of a policy's tasks in head order, from its `env_kwargs`.
+def _named(policy: MultiHeadPolicy) -> PolicyContract:
+    """The policy's contract; it names the tasks.
 
     Raises:
-        InvalidInputError: if they are not as many as its task id has entries.
+        InvalidInputError: if the policy has none.
     """
-    tasks = tuple(policy.env_kwargs.get("tasks") or TASKS)
-    if len(tasks) != policy.n_tasks:
-        raise InvalidInputError(f"env_kwargs must name the policy's {policy.n_tasks} tasks, got {tasks}")
-    return tasks
+    if policy.contract is None:
+        raise InvalidInputError("a policy with a contract was expected: its tasks have no names")
+    return policy.contract
 
 
 @torch.no_grad()
@@ -135,34 +102,34 @@ def trunk_features(policy: MultiHeadPolicy, dataset: Demonstrations) -> Demonstr
 
     Args:
         policy: a trained one.
-        dataset: rows with observations of shape (n, D).
+        dataset: rows of its contract, with tasks that it has.
 
     Returns:
-        Observations of shape (n, width + K): features and the rows' own task id.
+        Observations of shape (n, width + K): features and the policy's task id.
 
     Raises:
-        InvalidInputError: if the observations do not fit the policy's, or a task is none of its own.
+        InvalidInputError: if the rows do not belong to the policy's contract, or a task is none of the policy's.
     """
-    rows = dataset.with_tasks(tasks_of(policy))
-    if rows.obs.shape[1:] != policy.observation_space.shape:
-        size = policy.observation_space.shape[0] - policy.n_tasks
-        raise InvalidInputError(
-            f"observations must have {size} entries and the task id, got {rows.obs.shape[1] - policy.n_tasks}"
-        )
+    contract = _named(policy)
+    rows = dataset.fitted_to(contract)
     obs = torch.as_tensor(rows.obs).split(BATCH)
-    features = [policy.actor.trunk(policy._normalized(each.to(policy.device))).cpu() for each in obs]
+    features = [policy.actor.trunk(policy.normalized(each.to(policy.device))).cpu() for each in obs]
     seen = np.hstack([torch.cat(features).numpy(), rows.obs[:, -policy.n_tasks :]])
-    return dataclasses.replace(rows, obs=seen)
+    return dataclasses.replace(rows, obs=seen, contract=_of_features(contract, policy.width))
 
 
-def _heads_alone(policy: MultiHeadPolicy, names: tuple[str, ...]) -> MultiHeadPolicy:
+def _of_features(contract: PolicyContract, width: int) -> PolicyContract:
+    """The contract of rows that hold a trunk's features."""
+    return contract.with_terms([ObservationTerm("trunk_features", width)])
+
+
+def _heads_alone(policy: MultiHeadPolicy, names: tuple[str, ...], contract: PolicyContract) -> MultiHeadPolicy:
     """A policy whose observations are the trunk's features; its heads are those of the policy, not copies of them."""
-    tasks = tasks_of(policy)
     space = spaces.Box(-np.inf, np.inf, (policy.width + len(names),), np.float32)
     heads = MultiHeadPolicy(
-        space, policy.action_space, width=policy.width, n_tasks=len(names), clip_sd=np.inf, seed=0
+        space, policy.action_space, contract=contract, width=policy.width, clip_sd=np.inf, seed=0
     ).to(policy.device)
     heads.actor.trunk = nn.Identity()
-    heads.actor.heads = nn.ModuleList(policy.actor.heads[tasks.index(name)] for name in names)
+    heads.actor.heads = nn.ModuleList(policy.actor.heads[policy.tasks.index(name)] for name in names)
     heads.act_normalizer = policy.act_normalizer
     return heads

@@ -32,7 +32,7 @@ class BCConfig:
         steps: gradient steps.
         batch_size: rows per step, shared evenly among the tasks.
         learning_rate: peak of the one-cycle schedule.
-        warmup: share of the steps before the peak.
+        warmup: fraction of the steps before the peak.
         weight_decay: of AdamW.
         max_grad_norm: gradients longer than this are shortened.
         space: "radians" or "normalized"; see `trainers.algorithms.losses.MultiTaskLoss`.
@@ -143,10 +143,13 @@ class BCTrainer(imitation_bc.BC):
             weights: how often each row is drawn per pass, positive integers, shape (n,); None draws each once.
 
         Raises:
-            InvalidInputError: if the weights are not as described.
+            InvalidInputError: if the weights are not as described, or the rows do not belong to the policy's contract;
+                rows whose tasks are in another order are brought into the policy's.
             TrainingDivergedError: if the loss is no longer finite.
         """
         config, policy = self.config, self.policy
+        dataset = dataset.fitted_to(policy.contract)
+        validation = None if validation is None else validation.fitted_to(policy.contract)
         batch_size = min(config.batch_size, len(dataset))
         self.batch_size = self.minibatch_size = batch_size
         seed = config.seed if seed is None else seed
@@ -280,7 +283,11 @@ def train_bc(
 
     Returns:
         Losses and held-out R2 over the steps.
+
+    Raises:
+        InvalidInputError: if the rows do not belong to the policy's contract; nothing is changed then.
     """
+    dataset = dataset.fitted_to(policy.contract)
     if fit_normalization:
         policy.fit_normalization(dataset.obs, dataset.acts)
     return BCTrainer(policy, config, logger).fit(dataset, validation, progress, on_batch_end)

@@ -18,11 +18,11 @@ from trainers.algorithms.bc import BCConfig, BCHistory, BCTrainer
 from trainers.algorithms.dagger_collector import BlockCollector
 from trainers.data.collection import ShardMismatchError
 from trainers.data.demonstrations import Demonstrations
-from trainers.data.environments import derive_seed
+from trainers.data.environments import contracts_of, derive_seed
 from trainers.policies.expert_policy import ExpertPolicy
 from trainers.policies.multi_head import MultiHeadPolicy
 from trainers.policies.stateful import Learner
-from trainers.utils.files import write_atomically
+from trainers.utils.files import json_ready, write_json
 from trainers.utils.logging import make_logger
 
 
@@ -89,7 +89,8 @@ class DAggerTrainer(imitation_dagger.DAggerTrainer):
         progress: show bars.
 
     Raises:
-        ShardMismatchError: if `scratch_dir` was filled with other settings.
+        InvalidInputError: if environments, policy and base do not belong together.
+        ShardMismatchError: if `scratch_dir` was filled with other settings, or on another base.
     """
 
     def __init__(
@@ -106,7 +107,11 @@ class DAggerTrainer(imitation_dagger.DAggerTrainer):
         progress: bool = False,
     ) -> None:
         self.config = config or DAggerConfig()
-        self.base = base
+        for contract in contracts_of(venv):
+            base.contract.check(contract, "the base", "the environments")
+        self.base = base.fitted_to(policy.contract)
+        if self.base.tasks != base.tasks:
+            raise InvalidInputError(f"the policy has the tasks {policy.tasks}, environments and base have {base.tasks}")
         self.validation = validation
         self.progress = progress
         logger = make_logger() if logger is None else logger
@@ -255,19 +260,23 @@ class DAggerTrainer(imitation_dagger.DAggerTrainer):
         settings = {
             "config": dataclasses.asdict(self.config),
             "bc_config": dataclasses.asdict(self.bc_trainer.config),
-            "network": self.policy.network_kwargs(),
-            "base_rows": len(self.base),
+            "network": self.policy.network_kwargs() | {"contract": None},
+            "contract": self.base.contract.as_dict(),
+            "base": self.base.fingerprint(),
         }
-        text = json.dumps(settings, indent=1, default=str)
+        settings = json_ready(settings)
         path = self.scratch_dir / "config.json"
         if not path.is_file():
-            write_atomically(path, lambda file: file.write(text.encode()))
+            write_json(path, settings)
             return
-        found = json.loads(path.read_text())
+        claimed = json.loads(path.read_text())
         for name, kind in (("config", DAggerConfig), ("bc_config", BCConfig)):  # with options that came later
-            found[name] = dataclasses.asdict(kind()) | found.get(name, {})
-        if found != json.loads(text):
-            raise ShardMismatchError(f"{self.scratch_dir} holds rounds made with other settings; use another folder")
+            claimed[name] = json_ready(dataclasses.asdict(kind())) | claimed.get(name, {})
+        differing = sorted(name for name in settings | claimed if settings.get(name) != claimed.get(name))
+        if differing:
+            raise ShardMismatchError(
+                f"{self.scratch_dir} holds rounds made with another {', '.join(differing)}; use another folder"
+            )
 
 
 def _read_round(path: Path, meta: dict[str, Any]) -> Demonstrations | None:

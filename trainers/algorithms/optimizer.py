@@ -41,7 +41,7 @@ def adamw_one_cycle(
         learning_rate: peak of the schedule.
         weight_decay: of AdamW.
         steps: gradient steps.
-        warmup: share of the steps before the peak.
+        warmup: fraction of the steps before the peak.
     """
     optimizer = torch.optim.AdamW(weights, lr=learning_rate, weight_decay=weight_decay, fused=True)
     schedule = torch.optim.lr_scheduler.OneCycleLR(

@@ -12,6 +12,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 from tqdm.auto import tqdm
 
+from go1_mtl_gym.contract import terms_of
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
 from go1_mtl_gym.sensing.observation import ObservationLayout
 from trainers.data.demonstrations import Demonstrations
@@ -113,32 +114,32 @@ def watch(
     *,
     make_env: EnvFactory = make_env,
     **env_kwargs: Any,
-) -> tuple[Demonstrations, ObservationLayout]:
+) -> Demonstrations:
     """Let a policy without a state drive, and record what it did; no expert is asked.
 
     Args:
-        policy: with ``predict(obs, deterministic=True)`` and `env_kwargs`, of one frame of proprioception.
+        policy: with ``predict(obs, deterministic=True)``, `env_kwargs` and `contract`, of one frame of proprioception.
         task, seed, seconds, perturbation: as in `CollectJob`.
         history: frames of proprioception that are recorded; the policy sees the newest.
         make_env: another environment factory.
         env_kwargs: of the environment; on top of the policy's own ``env_kwargs``.
 
-    Returns:
-        The rows, and the layout of their observations.
-
     Raises:
-        InvalidInputError: if the policy sees several frames, the seed is negative or the seconds are not positive.
+        InvalidInputError: if the policy sees several frames or was made for another environment, the seed is negative
+            or the seconds are not positive.
         CollectionError: if falls leave less than a fifth of the steps.
     """
-    frames = policy.env_kwargs.get("history", 1)
-    if frames != 1:
-        raise InvalidInputError(f"a policy of one frame of proprioception was expected, got one of {frames}")
-    job = CollectJob(task, seed, seconds, None, perturbation, {**policy.env_kwargs, "history": history, **env_kwargs})
+    if policy.contract.history != 1:
+        raise InvalidInputError(f"a policy of one frame of proprioception was expected, got {policy.contract.history}")
+    job = CollectJob(task, seed, seconds, None, perturbation, {**policy.env_kwargs, **env_kwargs, "history": history})
     env = make_env(task, perturbation, **{"episode_s": EPISODE_S, **job.env_kwargs})
-    layout = env.unwrapped.layout
-    columns = layout.columns(ObservationLayout(layout.tasks, layout.channels))
     try:
-        return _record(env, job, lambda obs: policy.predict(obs[columns], deterministic=True)[0]), layout
+        contract = env.unwrapped.contract
+        layout = ObservationLayout(contract.tasks, contract.channels, contract.history)
+        newest = ObservationLayout(contract.tasks, contract.channels)
+        policy.contract.check(contract.with_terms(terms_of(newest)), "the policy", "the environment")
+        columns = layout.columns(newest)
+        return _record(env, job, lambda obs: policy.predict(obs[columns], deterministic=True)[0])
     finally:
         env.close()
 
@@ -176,10 +177,7 @@ def _record(env: Any, job: CollectJob, act: Callable[[np.ndarray], np.ndarray]) 
         obs=np.array(obs_rows),
         acts=np.array(act_rows),
         starts=marks,
-        tasks=base.tasks,
-        center=base.action_map.center,
-        half_range=base.action_map.half_range,
-        control_hz=base.control_hz,
+        contract=base.contract,
         meta={"job": job.as_dict()},
     )
 

@@ -10,6 +10,7 @@ import gymnasium
 import numpy as np
 
 import go1_mtl_gym
+from go1_mtl_gym.contract import PolicyContract
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import interval_s, number_in
 
@@ -49,7 +50,12 @@ class PerturbationConfig:
 
 
 class ExpertAccess(gymnasium.Wrapper):
-    """Carries `expert_action` outward, so that ``venv.env_method("expert_action")`` finds it on every gymnasium."""
+    """Carries `expert_action` and `contract` outward, so that a vector environment finds them on every gymnasium."""
+
+    @property
+    def contract(self) -> PolicyContract:
+        """What gives observations and actions their meaning."""
+        return self.env.unwrapped.contract
 
     def expert_action(self) -> np.ndarray:
         """The expert's action at the present state, shape (12,)."""
@@ -96,6 +102,15 @@ def make_venv(
     calls = [functools.partial(make_env, task, perturbation, **kwargs) for task in tasks]
     thunks = [WithTasks(call) for call in calls for _ in range(per_task)]
     return SubprocVecEnv(thunks, start_method="spawn") if subproc else DummyVecEnv(thunks)
+
+
+def contracts_of(venv: Any) -> tuple[PolicyContract, ...]:
+    """The different contracts of the environments in a stable-baselines3 vector environment; none if they have none."""
+    try:
+        contracts = venv.get_attr("contract")
+    except AttributeError:
+        return ()
+    return tuple(dict.fromkeys(contracts))
 
 
 @dataclasses.dataclass(frozen=True)

@@ -36,12 +36,12 @@ def joint_target_figure(
     figure = Figure(figsize=(3.6 * len(JOINTS), 1.9 * len(per_task) + 0.4), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots(len(per_task), len(JOINTS), squeeze=False, sharex=True)
-    for row, (task, own) in enumerate(per_task.items()):
-        episode = next(own.episodes())
-        shown = slice(max(episode.start, episode.stop - round(seconds * own.control_hz)), episode.stop)
-        time = np.arange(shown.stop - shown.start) / own.control_hz
-        predicted = own.center + own.half_range * policy.predict(own.obs[shown], deterministic=True)[0]
-        expert = own.center + own.half_range * own.acts[shown]
+    for row, (task, rows) in enumerate(per_task.items()):
+        episode = next(rows.episodes())
+        shown = slice(max(episode.start, episode.stop - round(seconds * rows.control_hz)), episode.stop)
+        time = np.arange(shown.stop - shown.start) / rows.control_hz
+        predicted = rows.contract.to_radians(policy.predict(rows.obs[shown], deterministic=True)[0])
+        expert = rows.contract.to_radians(rows.acts[shown])
         for column, (joint, index) in enumerate(JOINTS.items()):
             ax = axes[row, column]
             ax.plot(time, expert[:, index], color="0.55", linewidth=2.5, label="expert")

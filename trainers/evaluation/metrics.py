@@ -20,19 +20,24 @@ def offline_metrics(
     """One-step errors of the joint targets on demonstrations, per task; see `regression_metrics` for the definitions.
 
     Args:
-        policy: anything with ``predict(obs, deterministic=True) -> (acts, state)`` on batches.
+        policy: anything with ``predict(obs, deterministic=True) -> (acts, state)`` on batches; where it has a
+            `contract`, the rows are brought into its order of tasks.
         demonstrations: held-out rows.
         half_range: radians per unit of action, shape (12,); None takes the demonstrations' own.
 
     Returns:
         task -> {"mse" [rad^2], "mae" [rad], "r2", "r2_joint_mean"}, for the tasks that have rows.
+
+    Raises:
+        InvalidInputError: if the rows do not belong to the policy's contract.
     """
+    demonstrations = demonstrations.fitted_to(getattr(policy, "contract", None))
     scale = demonstrations.half_range if half_range is None else np.asarray(half_range, dtype=np.float64)
     scores = {}
-    for name, own in demonstrations.per_task().items():
-        chunks = range(0, len(own), BATCH)
-        predicted = np.concatenate([policy.predict(own.obs[i : i + BATCH], deterministic=True)[0] for i in chunks])
-        scores[name] = regression_metrics(scale * predicted, scale * own.acts)
+    for name, rows in demonstrations.per_task().items():
+        chunks = range(0, len(rows), BATCH)
+        predicted = np.concatenate([policy.predict(rows.obs[i : i + BATCH], deterministic=True)[0] for i in chunks])
+        scores[name] = regression_metrics(scale * predicted, scale * rows.acts)
     return scores
 
 

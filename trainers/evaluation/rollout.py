@@ -10,6 +10,7 @@ from threadpoolctl import threadpool_limits
 from tqdm.auto import tqdm
 
 from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.expert import check_expert_fits
 from trainers.data.environments import EnvFactory, WithTasks
 from trainers.evaluation.scoring import Series
 from trainers.policies.stateful import Learner
@@ -18,18 +19,39 @@ from trainers.policies.stateful import Learner
 def controller(policy_or_expert: Any, env: Any) -> Callable[[np.ndarray], np.ndarray]:
     """What turns the observations of one episode of `env`, in their order, into actions; make one per episode.
 
+    Args:
+        policy_or_expert: as in `trainers.evaluate`.
+        env: the environment; None only looks at what the other is.
+
     Raises:
-        InvalidInputError: if it is neither a policy nor an expert.
+        InvalidInputError: if it is neither a policy nor an expert, or was made for another environment.
     """
     if isinstance(policy_or_expert, str) and policy_or_expert == "expert":
         return lambda obs: env.expert_action()
     if hasattr(policy_or_expert, "predict"):
+        if env is not None:
+            _check_contract(policy_or_expert, env)
         return _follow(Learner(policy_or_expert))
     if hasattr(policy_or_expert, "action"):
+        if env is not None:
+            _check_expert(policy_or_expert, env)
         return lambda obs: env.action_map.from_radians(policy_or_expert.action(_expert_state(env))).astype(np.float32)
     raise InvalidInputError(
         f'expected something with predict(obs), something with action(state), or "expert"; got {policy_or_expert!r}'
     )
+
+
+def _check_contract(policy: Any, env: Any) -> None:
+    """Refuse a policy that was made for other observations, actions or rates than the environment's."""
+    expected, contract = getattr(policy, "contract", None), getattr(env, "contract", None)
+    if expected is not None and contract is not None:
+        expected.check(contract, "the policy", "the environment")
+
+
+def _check_expert(expert: Any, env: Any) -> None:
+    """Refuse an expert that was made for other gains or another rate than the environment's."""
+    if hasattr(env, "gains"):
+        check_expert_fits(expert, env.gains, env.control_s)
 
 
 def _follow(learner: Learner) -> Callable[[np.ndarray], np.ndarray]:

@@ -1,15 +1,14 @@
-"""Policies on disk: one zip of ``policy.json`` and safetensors files; reading it executes no code.
-
-``weights.safetensors`` holds the student, ``phase.safetensors`` the phase estimator of a phase_free one.
-"""
+"""Policies on disk: one zip of ``policy.json`` and safetensors files; reading it executes no code."""
 
 import json
 import math
 import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO, TypeVar
+from typing import Any, BinaryIO, ClassVar, TypeVar
 
 import numpy as np
 import safetensors.torch
@@ -17,17 +16,13 @@ import torch
 from gymnasium.spaces import Box
 
 from go1_mtl_gym.errors import InvalidInputError
+from trainers.policies.upgrade import upgraded
 from trainers.utils.files import write_atomically
 
-if TYPE_CHECKING:
-    from trainers.policies.multi_head import MultiHeadPolicy
-    from trainers.policies.phase_free import PhaseFreePolicy
-
-P = TypeVar("P")
+P = TypeVar("P", bound="SavedPolicy")
 FORMAT = "go1-mtl-gym policy"
-FORMAT_VERSION = 1
-WEIGHTS = "weights.safetensors"
-PHASE_WEIGHTS = "phase.safetensors"
+FORMAT_VERSION = 2
+DESCRIPTION = "policy.json"
 PACKAGES = (
     "go1-mtl-gym",
     "numpy",
@@ -45,164 +40,210 @@ class CheckpointError(InvalidInputError):
     """A file is not a policy that this version can read."""
 
 
-def save(policy: "MultiHeadPolicy | PhaseFreePolicy", path: str | PathLike[str]) -> None:
-    """Write a policy; whoever reads `path` meanwhile sees the old file or the new one, never a part.
+@dataclass(frozen=True)
+class Checkpoint:
+    """What a file holds.
+
+    Attributes:
+        kind: of policy; see `SavedPolicy.kind`.
+        policy: JSON values that rebuild it, but for its weights.
+        weights: name of a file of weights without its suffix -> tensors by name.
+    """
+
+    kind: str
+    policy: dict[str, Any]
+    weights: dict[str, dict[str, torch.Tensor]]
+
+
+class SavedPolicy:
+    """How policies go to disk and come back, in place of stable-baselines3's pickles.
+
+    Attributes:
+        kind: name of the kind of policy in its files.
+        weight_files: names of its files of weights, without their suffix.
+    """
+
+    kind: ClassVar[str]
+    weight_files: ClassVar[tuple[str, ...]]
+
+    def to_checkpoint(self) -> Checkpoint:
+        """All that `from_checkpoint` needs."""
+        raise NotImplementedError
+
+    @classmethod
+    def from_checkpoint(cls: type[P], checkpoint: Checkpoint) -> P:
+        """An equal policy."""
+        raise NotImplementedError
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the policy to one zip file without pickles.
+
+        Whoever reads `path` meanwhile sees the old file or the new one, never a part.
+        """
+        write_checkpoint(self.to_checkpoint(), path)
+
+    @classmethod
+    def load(cls: type[P], path: str | PathLike[str], device: torch.device | str = "cpu") -> P:
+        """Read what `save` wrote, in evaluation mode.
+
+        Args:
+            path: the zip file.
+            device: where its tensors go.
+
+        Raises:
+            InvalidInputError: if there is no such device.
+            CheckpointError: if the file is missing, damaged, or holds another kind of policy.
+        """
+        where, checkpoint = checked_device(device), read_checkpoint(path)
+        if checkpoint.kind != cls.kind:
+            raise CheckpointError(f"{path} holds a {checkpoint.kind} policy, a {cls.kind} one was expected")
+        return rebuild(cls, checkpoint, path, where)
+
+
+def rebuild(cls: type[P], checkpoint: Checkpoint, path: str | PathLike[str], device: torch.device) -> P:
+    """A policy of a class from a checkpoint, in evaluation mode.
 
     Raises:
-        InvalidInputError: if `env_kwargs` hold something that JSON cannot.
+        CheckpointError: if the checkpoint does not hold together.
     """
-    student = getattr(policy, "student", policy)
+    if set(checkpoint.weights) != set(cls.weight_files):
+        expected, got = ([f"{name}.safetensors" for name in names] for names in (cls.weight_files, checkpoint.weights))
+        raise CheckpointError(f"{path} is damaged: expected the weights {expected} in it, got {got}")
+    try:
+        policy = cls.from_checkpoint(checkpoint)
+    except (KeyError, TypeError, ValueError, RuntimeError, AttributeError) as error:
+        raise CheckpointError(f"{path} does not hold a consistent policy: {error}") from error
+    policy.to(device)  # type: ignore[attr-defined]  # every saved policy is a torch module
+    policy.set_training_mode(False)  # type: ignore[attr-defined]  # ... of stable-baselines3
+    return policy
+
+
+def checked_device(device: torch.device | str) -> torch.device:
+    """A device that torch knows and has.
+
+    Raises:
+        InvalidInputError: if it is none.
+    """
+    try:
+        return torch.empty(0, device=torch.device(device)).device
+    except (RuntimeError, TypeError, AssertionError) as error:
+        reason = str(error).partition("\n")[0]
+        raise InvalidInputError(
+            f'device must be one that torch has, such as "cpu", got {device!r}: {reason}'
+        ) from error
+
+
+# -- Files -------------------------------------------------------------------------------------------------------------
+
+
+def write_checkpoint(checkpoint: Checkpoint, path: str | PathLike[str]) -> None:
+    """Write one zip file; it is complete or not there, and equal policies are equal files."""
     description = {
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
-        "network": student.network_kwargs(),
-        "observation_space": _space_to_json(student.observation_space),
-        "action_space": _space_to_json(student.action_space),
+        "kind": checkpoint.kind,
+        "policy": checkpoint.policy,
         "versions": versions(),
     }
-    if student is not policy:
-        estimator = policy.estimator
-        description["phase_free"] = {
-            "history": estimator.layout.history,
-            "width": estimator.width,
-            "correction": policy.correction,
-        }
-    try:
-        text = json.dumps(description, indent=1, allow_nan=False)
-    except (TypeError, ValueError) as error:
-        raise InvalidInputError(f"env_kwargs must be JSON values to be saved, got {policy.env_kwargs!r}") from error
-
-    files = {"policy.json": text, WEIGHTS: _to_bytes(student)}
-    if student is not policy:
-        files[PHASE_WEIGHTS] = _to_bytes(policy.estimator)
+    files: dict[str, str | bytes] = {DESCRIPTION: json.dumps(description, indent=1, allow_nan=False)}
+    files |= {f"{name}.safetensors": safetensors.torch.save(tensors) for name, tensors in checkpoint.weights.items()}
 
     def write(file: BinaryIO) -> None:
         with zipfile.ZipFile(file, "w") as archive:
             for name, content in files.items():
-                archive.writestr(zipfile.ZipInfo(name), content)  # without the time: equal policies are equal files
+                archive.writestr(zipfile.ZipInfo(name), content)  # without the time
 
     write_atomically(path, write)
 
 
-def load(path: str | PathLike[str], device: torch.device | str = "cpu") -> "MultiHeadPolicy | PhaseFreePolicy":
-    """Read a policy that was saved, in evaluation mode.
-
-    Args:
-        path: the zip file.
-        device: where its tensors go.
+def read_checkpoint(path: str | PathLike[str]) -> Checkpoint:
+    """Read what `write_checkpoint` wrote, or what version 0.1 did.
 
     Raises:
         CheckpointError: if the file is missing, damaged, or something else.
     """
-    from trainers.policies.multi_head import MultiHeadPolicy
-
-    description, weights = _read(Path(path))
+    description, weights = _read_zip(_existing(path))
+    if not isinstance(description, dict) or description.get("format") != FORMAT:
+        raise CheckpointError(f"{path} is not a {FORMAT!r} file")
+    format_version = description.get("format_version")
     try:
-        network = {name: _tuples(value) for name, value in description["network"].items()}
-        spaces = [_space_from_json(description[name]) for name in ("observation_space", "action_space")]
-        policy = MultiHeadPolicy(*spaces, seed=0, **network)
-        policy.seed = None
-        policy.load_state_dict(weights[WEIGHTS])
-        if "phase_free" in description:
-            policy = _phase_free(policy, description["phase_free"], weights[PHASE_WEIGHTS])
-    except (KeyError, TypeError, ValueError, RuntimeError) as error:
-        raise CheckpointError(f"{path} does not hold a consistent policy: {error}") from error
-    policy.to(torch.device(device))
-    policy.set_training_mode(False)
-    return policy
+        if format_version == 1:
+            description, weights = upgraded(description, weights)
+        elif format_version != FORMAT_VERSION:
+            raise CheckpointError(f"{path} has format version {format_version!r}; this package reads {FORMAT_VERSION}")
+        return Checkpoint(description["kind"], description["policy"], weights)
+    except CheckpointError:
+        raise
+    except InvalidInputError as error:
+        raise CheckpointError(f"{path}: {error}") from error
+    except (KeyError, TypeError, AttributeError) as error:
+        raise CheckpointError(f"{path} is damaged: {error!r} in its description") from error
 
 
-class SavedPolicy:
-    """How policies go to disk and come back, in place of stable-baselines3's pickles."""
-
-    def save(self, path: str | PathLike[str]) -> None:
-        """Write the policy to one zip file without pickles; see `trainers.policies.checkpoint.save`."""
-        save(self, path)
-
-    @classmethod
-    def load(cls: type[P], path: str | PathLike[str], device: torch.device | str = "cpu") -> P:
-        """Read what `save` wrote.
-
-        Raises:
-            CheckpointError: if the file is missing, damaged, or holds another kind of policy.
-        """
-        policy = load(path, device)
-        if not isinstance(policy, cls):
-            raise CheckpointError(f"{path} holds a {type(policy).__name__}, a {cls.__name__} was expected")
-        return policy
+def _existing(path: object) -> Path:
+    if not isinstance(path, (str, PathLike)):
+        raise InvalidInputError(f"path must be a string or a path, got {path!r}")
+    file = Path(path)
+    if not file.is_file():
+        raise CheckpointError(f"no policy at {file}: there is no such file")
+    return file
 
 
-def _phase_free(
-    student: "MultiHeadPolicy", description: dict[str, Any], weights: dict[str, torch.Tensor]
-) -> "PhaseFreePolicy":
-    from trainers.policies.phase_estimator import PhaseEstimator
-    from trainers.policies.phase_free import PhaseFreePolicy, phase_free_layout
-
-    estimator = PhaseEstimator(phase_free_layout(student, description["history"]), description["width"])
-    estimator.load_state_dict(weights)
-    return PhaseFreePolicy(student, estimator, description["correction"])
-
-
-def _to_bytes(module: torch.nn.Module) -> bytes:
-    return safetensors.torch.save(
-        {name: value.detach().cpu().contiguous() for name, value in module.state_dict().items()}
-    )
-
-
-def versions() -> dict[str, str]:
-    """Installed versions of the packages that shape a result."""
-    found = {}
-    for name in PACKAGES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "not installed"
-    return found
-
-
-def _read(path: Path) -> tuple[dict[str, Any], dict[str, dict[str, torch.Tensor]]]:
+def _read_zip(path: Path) -> tuple[Any, dict[str, dict[str, torch.Tensor]]]:
     """The description, and the tensors of every file of weights."""
-    if not path.is_file():
-        raise CheckpointError(f"no policy at {path}: there is no such file")
     try:
         with zipfile.ZipFile(path) as archive:
-            if "policy.json" not in archive.namelist():
+            names = archive.namelist()
+            if DESCRIPTION not in names:
                 raise CheckpointError(
-                    f"{path} was not written by MultiHeadPolicy.save: there is no policy.json in it (PPO.load "
-                    "reads what PPO.save wrote)"
+                    f"{path} was not written by MultiHeadPolicy.save: there is no {DESCRIPTION} in it (PPO.load reads "
+                    "what PPO.save wrote)"
                 )
-            description = json.loads(archive.read("policy.json"))
-            files = [name for name in (WEIGHTS, PHASE_WEIGHTS) if name in archive.namelist()]
-            weights = {name: safetensors.torch.load(archive.read(name)) for name in files}
+            files = [name for name in names if name.endswith(".safetensors")]
+            weights = {name.removesuffix(".safetensors"): safetensors.torch.load(archive.read(name)) for name in files}
+            return json.loads(archive.read(DESCRIPTION)), weights
     except CheckpointError:
         raise
     except Exception as error:  # zip, JSON and safetensors each raise their own on damage
         raise CheckpointError(f"{path} is damaged or no policy file: {error}") from error
-    if not isinstance(description, dict) or description.get("format") != FORMAT:
-        raise CheckpointError(f"{path} is not a {FORMAT!r} file")
-    if description.get("format_version") != FORMAT_VERSION:
-        got = description.get("format_version")
-        raise CheckpointError(f"{path} has format version {got!r}; this package reads {FORMAT_VERSION}")
-    wanted = [WEIGHTS, PHASE_WEIGHTS] if "phase_free" in description else [WEIGHTS]
-    if files != wanted:
-        raise CheckpointError(f"{path} is damaged: expected the weights {wanted} in it, got {files}")
-    return description, weights
 
 
-def _space_to_json(space: Box) -> dict[str, Any]:
+# -- Parts of a description --------------------------------------------------------------------------------------------
+
+
+def tensors_of(module: torch.nn.Module) -> dict[str, torch.Tensor]:
+    """The weights and buffers of a module, as safetensors wants them."""
+    return {name: value.detach().cpu().contiguous() for name, value in module.state_dict().items()}
+
+
+def versions() -> dict[str, str]:
+    """Installed versions of the packages that shape a result."""
+    installed = {}
+    for name in PACKAGES:
+        try:
+            installed[name] = version(name)
+        except PackageNotFoundError:
+            installed[name] = "not installed"
+    return installed
+
+
+def space_to_json(space: Box) -> dict[str, Any]:
+    """A flat Box as JSON values."""
+
     def numbers(bound: np.ndarray) -> list[float | str]:
         return [value if math.isfinite(value) else repr(value) for value in bound.astype(np.float64).tolist()]
 
     return {"low": numbers(space.low), "high": numbers(space.high), "dtype": str(space.dtype)}
 
 
-def _space_from_json(space: dict[str, Any]) -> Box:
+def space_from_json(space: Mapping[str, Any]) -> Box:
+    """The inverse of `space_to_json`."""
     low, high = (np.array([float(value) for value in space[name]], dtype=space["dtype"]) for name in ("low", "high"))
     return Box(low, high, dtype=np.dtype(space["dtype"]).type)
 
 
-def _tuples(value: Any) -> Any:
+def tuples(value: Any) -> Any:
     """JSON lists back to tuples, at any depth."""
     if isinstance(value, dict):
-        return {name: _tuples(item) for name, item in value.items()}
-    return tuple(_tuples(item) for item in value) if isinstance(value, list) else value
+        return {name: tuples(item) for name, item in value.items()}
+    return tuple(tuples(item) for item in value) if isinstance(value, list) else value

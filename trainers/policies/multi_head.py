@@ -10,21 +10,33 @@ from stable_baselines3.common.distributions import DiagGaussianDistribution
 from stable_baselines3.common.policies import ActorCriticPolicy
 from torch import nn
 
-from go1_mtl_gym import TASKS
+from go1_mtl_gym import TASKS, PolicyContract
 from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.validation import one_of
 from trainers.policies import normalization as norm
-from trainers.policies.checkpoint import SavedPolicy
+from trainers.policies.checkpoint import (
+    Checkpoint,
+    SavedPolicy,
+    space_from_json,
+    space_to_json,
+    tensors_of,
+    tuples,
+)
+from trainers.policies.environment import ForEnvironment, json_arguments
 from trainers.policies.networks import MultiHeadActor, plain, seeded
 
 CRITIC_WIDTH = 64
 """Units of each hidden layer of the value network, which behaviour cloning never evaluates."""
+
+CRITIC_INPUT = "critic.0.weight"
+"""Weights of the critic's first layer, shape (units, D): the one-hot task id is its last columns."""
 
 
 def _constant_rate(_progress: float) -> float:
     return 3e-4
 
 
-class MultiHeadPolicy(SavedPolicy, ActorCriticPolicy):
+class MultiHeadPolicy(SavedPolicy, ForEnvironment, ActorCriticPolicy):
     """Actor with a shared trunk and one head per task, chosen by the one-hot task id that ends the observation.
 
     The trunk sees the normalised observation without the task id (clipped at `clip_sd`); the head gives the normalised
@@ -37,19 +49,28 @@ class MultiHeadPolicy(SavedPolicy, ActorCriticPolicy):
         action_space: flat Box of the actions.
         lr_schedule: progress -> learning rate of `optimizer`; stable-baselines3 passes its own.
         width: units of every hidden layer of the actor (the paper: 2560).
-        n_tasks: number of tasks K; None means those of `env_kwargs`, or all that are registered.
+        contract: of the environment it is for (``env.unwrapped.contract``); names the tasks, and is compared wherever
+            the policy meets environments or rows.
+        n_tasks: number of tasks K, for environments that have no contract; nothing is compared then but sizes.
         pooled: the baseline that ignores the task id: one head for all tasks, same depth as one path of the multi-head.
         normalization: "mean_std", "min_max" or "none"; used by `fit_normalization`.
         clip_sd: normalised inputs are clipped to +- this.
-        env_kwargs: what `gymnasium.make` needs for the environment it was trained for; travels with `save`.
-        log_std_init: initial log standard deviation of the exploration noise, in units of the action.
+        env_kwargs: what `gymnasium.make` needs beyond the contract for the environment it was trained for; travels with
+            `save`, so values are JSON's, or frozen dataclasses of the environment's, such as
+            `go1_mtl_gym.SensorNoise`.
+        log_std_init: initial log standard deviation of the exploration noise, in units of the action: at -3.5 targets
+            vary by 0.1 rad, which a trained policy survives; see `trainers.ppo_from_policy`.
         seed: of the initial weights, without touching torch's global generator; None draws from that generator.
         optimizer_class: for on-policy learning.
         optimizer_kwargs: of `optimizer_class`, without the learning rate.
 
     Raises:
-        InvalidInputError: if an argument is not as described.
+        InvalidInputError: if an argument is not as described, neither contract nor number of tasks is given, or the
+            spaces are not the contract's.
     """
+
+    kind = "multi_head"
+    weight_files = ("weights",)
 
     def __init__(
         self,
@@ -57,29 +78,31 @@ class MultiHeadPolicy(SavedPolicy, ActorCriticPolicy):
         action_space: spaces.Space,
         lr_schedule: Any = _constant_rate,
         *,
-        width: int = 256,
+        contract: PolicyContract | None = None,
         n_tasks: int | None = None,
+        width: int = 256,
         pooled: bool = False,
         normalization: str = "mean_std",
         clip_sd: float = 6.0,
         env_kwargs: Mapping[str, Any] | None = None,
-        log_std_init: float = -1.0,
+        log_std_init: float = -3.5,
         seed: int | None = None,
         optimizer_class: type[torch.optim.Optimizer] = torch.optim.Adam,
         optimizer_kwargs: dict[str, Any] | None = None,
         use_sde: bool = False,
     ) -> None:
-        env_kwargs = dict(env_kwargs or {})
-        if n_tasks is None:  # tasks that are registered later are none of this policy's
-            env_kwargs["tasks"] = tuple(env_kwargs.get("tasks") or TASKS)
-            n_tasks = len(env_kwargs["tasks"])
+        if contract is not None and n_tasks is None:
+            n_tasks = contract.n_tasks
         _check_arguments(observation_space, action_space, width, n_tasks, normalization, clip_sd, use_sde)
+        if contract is not None:
+            _check_spaces(contract, observation_space, action_space, n_tasks)
         self.width = int(width)
+        self.contract = contract
         self.n_tasks = int(n_tasks)
         self.pooled = bool(pooled)
         self.normalization = normalization
         self.clip_sd = float(clip_sd)
-        self.env_kwargs = env_kwargs
+        self.extra_env_kwargs = json_arguments(env_kwargs or {})
         self.seed = seed
         super().__init__(
             observation_space,
@@ -106,12 +129,13 @@ class MultiHeadPolicy(SavedPolicy, ActorCriticPolicy):
     def network_kwargs(self) -> dict[str, Any]:
         """Constructor arguments that shape the network: also ``policy_kwargs`` for a PPO that starts from it."""
         return {
-            "width": self.width,
+            "contract": self.contract,
             "n_tasks": self.n_tasks,
+            "width": self.width,
             "pooled": self.pooled,
             "normalization": self.normalization,
             "clip_sd": self.clip_sd,
-            "env_kwargs": self.env_kwargs,
+            "env_kwargs": self.extra_env_kwargs,
             "log_std_init": self.log_std_init,
         }
 
@@ -145,11 +169,13 @@ class MultiHeadPolicy(SavedPolicy, ActorCriticPolicy):
         self.obs_normalizer.set(*norm.fit(obs[:, : -self.n_tasks], self.normalization, binary))
         self.act_normalizer.set(*norm.fit(acts, self.normalization, np.zeros(acts.shape[1], dtype=bool)))
 
+    # -- New tasks ----------------------------------------------------------------------------------------------------
+
     def add_task(self, name: str, seed: int = 0, like: str | None = None) -> "MultiHeadPolicy":
         """A new policy that knows one task more, the last in its task id; this one stays as it is.
 
         Its space of observations is one entry longer, so whoever holds this policy and its spaces must take the new one
-        instead. Trunk, heads, normalisation, critic and exploration noise are copies: in the old tasks it acts as this
+        instead. Trunk, heads, normalization, critic and exploration noise are copies: in the old tasks it acts as this
         one does, to the bit. The new head is untrained (see `trainers.learn_task`), and the critic does not see the new
         task's entry yet.
 
@@ -162,9 +188,35 @@ class MultiHeadPolicy(SavedPolicy, ActorCriticPolicy):
         Raises:
             InvalidInputError: if the task is unknown or there already, `like` is not there, or this policy is pooled.
         """
-        from trainers.algorithms.add_task import add_task
+        tasks = self.tasks
+        if self.pooled:
+            raise InvalidInputError(
+                f"a policy with a head per task was expected, got a pooled one; it cannot add {name!r}"
+            )
+        one_of(name, [task for task in TASKS if task not in tasks], "a task that the policy does not have")
+        if like is not None:
+            one_of(like, tasks, "like")
+        grown = self._with_room_for(name, seed)
+        weights = self.state_dict()
+        weights[CRITIC_INPUT] = nn.functional.pad(weights[CRITIC_INPUT], (0, 1))
+        grown.load_state_dict(grown.state_dict() | weights)
+        if like is not None:
+            grown.actor.heads[-1].load_state_dict(self.actor.heads[tasks.index(like)].state_dict())
+        grown.seed = None  # no seed gives these weights
+        grown.set_training_mode(self.training)
+        return grown
 
-        return add_task(self, name, seed, like)
+    def _with_room_for(self, name: str, seed: int) -> "MultiHeadPolicy":
+        """An untrained policy like this one with one more task."""
+        space = self.observation_space
+        tasks = (*self.tasks, name)
+        arguments = self._get_constructor_parameters() | {
+            "observation_space": spaces.Box(np.append(space.low, np.float32(0)), np.append(space.high, np.float32(1))),
+            "contract": self.contract.with_tasks(tasks, {name: TASKS[name].gait}),
+            "n_tasks": len(tasks),
+            "seed": seed,
+        }
+        return MultiHeadPolicy(**arguments).to(self.device)
 
     # -- The actor -----------------------------------------------------------------------------------------------------
 
@@ -180,10 +232,11 @@ class MultiHeadPolicy(SavedPolicy, ActorCriticPolicy):
             rows: how many there are of each task if they come sorted by task; None looks them up.
         """
         if rows is None:
-            return self._means(self._normalized(obs), obs)
-        return self.act_normalizer.inverse(self.actor.in_blocks(self._normalized(obs), rows))
+            return self._means(self.normalized(obs), obs)
+        return self.act_normalizer.inverse(self.actor.in_blocks(self.normalized(obs), rows))
 
-    def _normalized(self, obs: torch.Tensor) -> torch.Tensor:
+    def normalized(self, obs: torch.Tensor) -> torch.Tensor:
+        """What the trunk sees of observations: without task id, normalized and clipped, shape (n, D - K)."""
         return self.obs_normalizer(obs[:, : -self.n_tasks].float()).clamp(-self.clip_sd, self.clip_sd)
 
     def _means(self, normalized: torch.Tensor, obs: torch.Tensor) -> torch.Tensor:
@@ -201,7 +254,7 @@ class MultiHeadPolicy(SavedPolicy, ActorCriticPolicy):
         self, obs: torch.Tensor, deterministic: bool = False
     ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
         """Actions (n, 12), values (n, 1) and log probabilities (n,)."""
-        normalized = self._normalized(obs)
+        normalized = self.normalized(obs)
         distribution = self._gaussian(self._means(normalized, obs))
         actions = distribution.get_actions(deterministic=deterministic)
         return actions, self._values(normalized, obs), distribution.log_prob(actions)
@@ -210,7 +263,7 @@ class MultiHeadPolicy(SavedPolicy, ActorCriticPolicy):
         self, obs: torch.Tensor, actions: torch.Tensor
     ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor | None]:
         """Values (n, 1), log probabilities (n,) and entropies (n,) of given actions."""
-        normalized = self._normalized(obs)
+        normalized = self.normalized(obs)
         distribution = self._gaussian(self._means(normalized, obs))
         return self._values(normalized, obs), distribution.log_prob(actions), distribution.entropy()
 
@@ -220,7 +273,7 @@ class MultiHeadPolicy(SavedPolicy, ActorCriticPolicy):
 
     def predict_values(self, obs: torch.Tensor) -> torch.Tensor:
         """Values, shape (n, 1)."""
-        return self._values(self._normalized(obs), obs)
+        return self._values(self.normalized(obs), obs)
 
     def set_training_mode(self, mode: bool) -> None:
         """Switch between training and evaluation; `predict` asks for it each time, and walking all modules is slow."""
@@ -241,13 +294,22 @@ class MultiHeadPolicy(SavedPolicy, ActorCriticPolicy):
         """Actions of one observation (D,) or a batch (n, D) of any mix of tasks, clipped to the action space.
 
         Raises:
-            InvalidInputError: if an observation is not finite, or does not end in a one-hot task id.
+            InvalidInputError: if an observation has another size or is not finite, or does not end in a one-hot task
+                id.
         """
-        if isinstance(observation, np.ndarray) and observation.shape[-1:] == self.observation_space.shape:
+        if isinstance(observation, np.ndarray):
             self._check_observation(observation)
         return super().predict(observation, state, episode_start, deterministic)
 
     def _check_observation(self, obs: np.ndarray) -> None:
+        size = self.observation_space.shape[0]
+        if obs.ndim not in (1, 2) or obs.shape[-1] != size:
+            meant = (
+                ""
+                if self.contract is None
+                else f" ({self.contract.describe()}; policy.make_env() makes the environment)"
+            )
+            raise InvalidInputError(f"observations must have shape ({size},) or (n, {size}){meant}, got {obs.shape}")
         if not np.isfinite(obs).all():
             raise InvalidInputError("observation must be finite, got NaN or infinity")
         task = obs[..., -self.n_tasks :]
@@ -260,12 +322,64 @@ class MultiHeadPolicy(SavedPolicy, ActorCriticPolicy):
 
     # -- Files ---------------------------------------------------------------------------------------------------------
 
+    def to_checkpoint(self) -> Checkpoint:
+        """All that `from_checkpoint` needs."""
+        network = {
+            name: value for name, value in self.network_kwargs().items() if name not in ("contract", "env_kwargs")
+        }
+        policy = {
+            "network": network,
+            "contract": None if self.contract is None else self.contract.as_dict(),
+            "env_kwargs": self.extra_env_kwargs,
+            "observation_space": space_to_json(self.observation_space),
+            "action_space": space_to_json(self.action_space),
+        }
+        return Checkpoint(self.kind, policy, {"weights": tensors_of(self)})
+
+    @classmethod
+    def from_checkpoint(cls, checkpoint: Checkpoint) -> "MultiHeadPolicy":
+        """An equal policy, but that no seed is known for its weights."""
+        values = checkpoint.policy
+        contract = None if values["contract"] is None else PolicyContract.from_dict(values["contract"])
+        policy = cls(
+            space_from_json(values["observation_space"]),
+            space_from_json(values["action_space"]),
+            contract=contract,
+            env_kwargs=tuples(values["env_kwargs"]),
+            seed=0,
+            **values["network"],
+        )
+        policy.seed = None
+        policy.load_state_dict(checkpoint.weights["weights"])
+        return policy
+
+
+def _check_spaces(contract: PolicyContract, observation_space: Any, action_space: Any, n_tasks: int) -> None:
+    sizes = (observation_space.shape, action_space.shape, n_tasks)
+    expected = ((contract.observation_size,), (len(contract.joints),), contract.n_tasks)
+    if sizes != expected:
+        raise InvalidInputError(
+            f"by the contract ({contract.describe()}) the shapes of observation and action space and n_tasks are "
+            f"{expected}, got {sizes}"
+        )
+
 
 def _check_arguments(
-    observation_space: Any, action_space: Any, width: int, n_tasks: int, normalization: str, clip_sd: float, sde: bool
+    observation_space: Any,
+    action_space: Any,
+    width: int,
+    n_tasks: int | None,
+    normalization: str,
+    clip_sd: float,
+    sde: bool,
 ) -> None:
-    if not isinstance(n_tasks, (int, np.integer)) or n_tasks < 1:
-        raise InvalidInputError(f"n_tasks must be a positive integer or None, got {n_tasks!r}")
+    if n_tasks is None:
+        raise InvalidInputError(
+            "a contract (or, for an environment without one, n_tasks) must be given, got neither; with PPO: "
+            "policy_kwargs={'contract': env.unwrapped.contract}"
+        )
+    if isinstance(n_tasks, bool) or not isinstance(n_tasks, (int, np.integer)) or n_tasks < 1:
+        raise InvalidInputError(f"n_tasks must be a positive integer, got {n_tasks!r}")
     if not isinstance(width, (int, np.integer)) or width < 1:
         raise InvalidInputError(f"width must be a positive integer, got {width!r}")
     for space, smallest, what in ((observation_space, n_tasks, "observation_space"), (action_space, 0, "action_space")):

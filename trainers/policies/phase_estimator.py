@@ -1,16 +1,13 @@
 """Telling where in its gait cycle a robot is, from what it feels and was told, without its clock."""
 
-import dataclasses
 from collections.abc import Mapping
 
 import numpy as np
 import torch
 from torch import nn
-from tqdm.auto import tqdm
 
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.sensing.observation import ObservationLayout
-from trainers.algorithms.optimizer import adamw_one_cycle
 from trainers.data.demonstrations import Demonstrations
 from trainers.policies import normalization as norm
 from trainers.policies.networks import plain, seeded
@@ -56,81 +53,17 @@ class PhaseEstimator(nn.Module):
         return unit(self(torch.as_tensor(obs, device=device)).cpu().numpy())
 
 
-@dataclasses.dataclass(frozen=True)
-class PhaseConfig:
-    """How to train a `PhaseEstimator`.
-
-    Attributes:
-        steps: gradient steps.
-        batch_size: rows per step.
-        learning_rate: peak of the one-cycle schedule.
-        weight_decay: of AdamW.
-        seed: of the order of the rows.
-
-    Raises:
-        InvalidInputError: if a figure is outside its range.
-    """
-
-    steps: int = 4000
-    batch_size: int = 1024
-    learning_rate: float = 2e-3
-    weight_decay: float = 1e-4
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        if not (self.steps > 0 and self.batch_size > 0 and self.learning_rate > 0 and self.weight_decay >= 0):
-            raise InvalidInputError(f"steps, batch_size and learning_rate must be > 0, weight_decay >= 0; got {self}")
-
-
-def train_phase(
-    estimator: PhaseEstimator,
-    rows: Demonstrations,
-    layout: ObservationLayout,
-    config: PhaseConfig | None = None,
-    progress: bool = False,
-) -> None:
-    """Fit normalisation and network to rows that hold the phase; the loss is the squared distance of (sine, cosine).
-
-    Args:
-        estimator: trained in place.
-        rows: of any driver; whoever drove, the clock that drove it is what is learned.
-        layout: of the rows; with the channel "phase" and all that the estimator's layout has.
-        config: how to train.
-        progress: show a bar.
-
-    Raises:
-        InvalidInputError: if the layouts do not fit, or there are no rows.
-    """
-    config = config or PhaseConfig()
-    seen, target = _inputs_and_phase(estimator, rows, layout)
-    device = estimator.normalizer.shift.device
-    estimator.normalizer.set(*norm.fit(seen, "mean_std"))
-    inputs, target = torch.as_tensor(seen, device=device), torch.as_tensor(target, device=device)
-    weights = list(estimator.network.parameters())
-    optimizer, schedule = adamw_one_cycle(weights, config.learning_rate, config.weight_decay, config.steps)
-    rng = np.random.default_rng(config.seed)
-    for _ in tqdm(range(config.steps), "phase", unit="step", disable=not progress):
-        batch = torch.from_numpy(rng.integers(len(seen), size=min(config.batch_size, len(seen)))).to(device)
-        loss = (estimator(inputs[batch]) - target[batch]).square().sum(dim=1).mean()
-        optimizer.zero_grad()
-        loss.backward()
-        optimizer.step()
-        schedule.step()
-
-
-def phase_errors(
-    estimator: PhaseEstimator, rows: Demonstrations, layout: ObservationLayout
-) -> Mapping[str, dict[str, float]]:
+def phase_errors(estimator: PhaseEstimator, rows: Demonstrations) -> Mapping[str, dict[str, float]]:
     """{task: {"median", "p99"}} of the absolute error of the phase [cycles], at most 0.5.
 
     Args:
         estimator: a trained one.
-        rows, layout: as in `train_phase`.
+        rows: that hold the phase and all that the estimator sees.
 
     Raises:
-        InvalidInputError: if the layouts do not fit, or there are no rows.
+        InvalidInputError: if the rows do not, or there are none.
     """
-    seen, target = _inputs_and_phase(estimator, rows, layout)
+    seen, target = inputs_and_phase(estimator, rows)
     error = phase_distance(estimator.estimate(seen), target)
     task = rows.task
     return {
@@ -140,12 +73,18 @@ def phase_errors(
     }
 
 
-def _inputs_and_phase(
-    estimator: PhaseEstimator, rows: Demonstrations, layout: ObservationLayout
-) -> tuple[np.ndarray, np.ndarray]:
-    if "phase" not in layout.channels or not len(rows):
-        raise InvalidInputError(f"expected rows with the phase, got {len(rows)} with the channels {layout.channels}")
-    return rows.select(layout, estimator.layout).obs, rows.obs[:, layout.slices["phase"]]
+def inputs_and_phase(estimator: PhaseEstimator, rows: Demonstrations) -> tuple[np.ndarray, np.ndarray]:
+    """What an estimator sees of rows, shape (n, D), and (sine, cosine) of their phase, shape (n, 2).
+
+    Raises:
+        InvalidInputError: if the rows hold no phase, lack something that the estimator sees, or there are none.
+    """
+    contract, layout = rows.contract, estimator.layout
+    if "phase" not in contract.channels or not len(rows):
+        raise InvalidInputError(f"expected rows with the phase, got {len(rows)} with the channels {contract.channels}")
+    if layout.tasks != contract.tasks:
+        raise InvalidInputError(f"the estimator knows the tasks {layout.tasks}, the rows have {contract.tasks}")
+    return rows.select(layout.channels, layout.history).obs, rows.obs[:, contract.slices["phase"]]
 
 
 def phase_distance(first: np.ndarray, second: np.ndarray) -> np.ndarray:

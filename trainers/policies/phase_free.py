@@ -1,31 +1,26 @@
 """A student without a clock: it tells the phase of its gait from what it feels."""
 
-import math
 from typing import Any
 
 import numpy as np
 import torch
 from gymnasium import spaces
 from stable_baselines3.common.policies import BasePolicy
-from tqdm.auto import tqdm
 
-from go1_mtl_gym import TASKS
 from go1_mtl_gym.clock import STAND_COMMAND
+from go1_mtl_gym.contract import terms_of
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.sensing.observation import ObservationLayout
-from go1_mtl_gym.validation import one_of
-from trainers.data.collection import EPISODE_S, watch
-from trainers.data.demonstrations import Demonstrations
-from trainers.data.environments import EnvFactory, PerturbationConfig, derive_seed, make_env
-from trainers.policies.checkpoint import SavedPolicy
+from trainers.policies.checkpoint import Checkpoint, SavedPolicy, tensors_of
+from trainers.policies.environment import ForEnvironment
 from trainers.policies.multi_head import MultiHeadPolicy
-from trainers.policies.phase_estimator import PhaseConfig, PhaseEstimator, train_phase, unit
+from trainers.policies.phase_estimator import PhaseEstimator, unit
 
 PHASE_0 = np.array([0.0, 1.0], dtype=np.float32)
 """Sine and cosine of phase 0."""
 
 
-class PhaseFreePolicy(SavedPolicy, BasePolicy):
+class PhaseFreePolicy(SavedPolicy, ForEnvironment, BasePolicy):
     """A student that learned with a gait clock, and an estimator that takes the clock's place.
 
     Its observation is the student's without the phase, with as many frames of proprioception as the estimator reads.
@@ -38,14 +33,16 @@ class PhaseFreePolicy(SavedPolicy, BasePolicy):
     phase 0 with an episode and with a change of task.
 
     Args:
-        student: sees the channels "command" and "phase"; its `env_kwargs` name its tasks.
+        student: sees the channels "command" and "phase"; its contract names its gaits.
         estimator: of the same tasks, and of the student's channels but for the phase.
         correction: in (0, 1].
 
     Raises:
-        InvalidInputError: if the two do not fit together, a task is not registered, or the correction is outside its
-            range.
+        InvalidInputError: if the two do not fit together, or the correction is outside its range.
     """
+
+    kind = "phase_free"
+    weight_files = ("weights", "phase")
 
     def __init__(self, student: MultiHeadPolicy, estimator: PhaseEstimator, correction: float = 1.0) -> None:
         layout = estimator.layout
@@ -59,17 +56,17 @@ class PhaseFreePolicy(SavedPolicy, BasePolicy):
             )
         if not 0 < correction <= 1:
             raise InvalidInputError(f"correction must lie in (0, 1], got {correction!r}")
-        for name in layout.tasks:
-            one_of(name, tuple(TASKS), "task")
         super().__init__(spaces.Box(layout.low, layout.high, dtype=np.float32), student.action_space)
         self.student = student
         self.estimator = estimator
         self.correction = float(correction)
         self.n_tasks = layout.n_tasks
-        channels = {"channels": layout.channels, "history": layout.history}
-        self.env_kwargs = student.env_kwargs | {"tasks": layout.tasks} | channels
-        gaits = [TASKS[name].gait for name in layout.tasks]
-        self._turn = np.array([1.0 / (gait.period * self.env_kwargs.get("control_hz", 50)) for gait in gaits])
+        self.contract = student.contract.with_terms(terms_of(layout))
+        self.extra_env_kwargs = student.extra_env_kwargs
+        gaits = self.contract.gaits
+        if not gaits:
+            raise InvalidInputError("a student whose contract names the gaits of its tasks was expected")
+        self._turn = np.array([1.0 / (gait.period * self.contract.control_hz) for gait in gaits])
         self._can_stand = np.array([gait.can_stand for gait in gaits])
         self._command = layout.slices["command"]
         self._columns = layout.columns(phase_free_layout(student, 1))
@@ -133,50 +130,28 @@ class PhaseFreePolicy(SavedPolicy, BasePolicy):
 
     # -- Files ---------------------------------------------------------------------------------------------------------
 
+    def to_checkpoint(self) -> Checkpoint:
+        """All that `from_checkpoint` needs."""
+        student = self.student.to_checkpoint()
+        phase = {
+            "history": self.estimator.layout.history,
+            "width": self.estimator.width,
+            "correction": self.correction,
+        }
+        weights = student.weights | {"phase": tensors_of(self.estimator)}
+        return Checkpoint(self.kind, {"student": student.policy, "phase": phase}, weights)
 
-def train_phase_free(
-    student: MultiHeadPolicy,
-    seconds: float = 240.0,
-    history: int = 10,
-    *,
-    correction: float = 1.0,
-    perturbation: PerturbationConfig | None = None,
-    config: PhaseConfig | None = None,
-    seed: int = 0,
-    progress: bool = False,
-    make_env: EnvFactory = make_env,
-    **env_kwargs: Any,
-) -> PhaseFreePolicy:
-    """Watch a student walk with its clock, and train an estimator of the phase from what it felt; no expert is asked.
-
-    Args:
-        student: a trained one.
-        seconds: watched per task [s].
-        history: frames of proprioception that the estimator reads.
-        correction: of the policy that is returned.
-        perturbation: of the walks; None is the default `PerturbationConfig`.
-        config: how to train the estimator.
-        seed: of the walks and of the initial weights.
-        progress: show bars.
-        make_env: another environment factory.
-        env_kwargs: of the environment; on top of the student's own ``env_kwargs``.
-
-    Raises:
-        InvalidInputError: if the student sees no command and phase, or a figure is outside its range.
-        CollectionError: if the student keeps falling.
-    """
-    estimator = PhaseEstimator(phase_free_layout(student, history), seed=seed)
-    policy = PhaseFreePolicy(student, estimator, correction)
-    shards = max(1, math.ceil(seconds / EPISODE_S))
-    walks = [(task, derive_seed("watch", seed, i)) for i in range(shards) for task in estimator.layout.tasks]
-    perturbation = perturbation or PerturbationConfig()
-    watched = [
-        watch(student, task, own, seconds / shards, perturbation, history, make_env=make_env, **env_kwargs)
-        for task, own in tqdm(walks, "watch", unit="walk", disable=not progress)
-    ]
-    rows = Demonstrations.concatenate([rows for rows, _ in watched])
-    train_phase(estimator, rows, watched[0][1], config, progress)
-    return policy
+    @classmethod
+    def from_checkpoint(cls, checkpoint: Checkpoint) -> "PhaseFreePolicy":
+        """An equal policy."""
+        values = checkpoint.policy
+        student = MultiHeadPolicy.from_checkpoint(
+            Checkpoint(MultiHeadPolicy.kind, values["student"], checkpoint.weights)
+        )
+        phase = values["phase"]
+        estimator = PhaseEstimator(phase_free_layout(student, phase["history"]), phase["width"])
+        estimator.load_state_dict(checkpoint.weights["phase"])
+        return cls(student, estimator, phase["correction"])
 
 
 def without_phase(channels: tuple[str, ...]) -> tuple[str, ...]:
@@ -190,21 +165,18 @@ def phase_free_layout(student: MultiHeadPolicy, history: int) -> ObservationLayo
     return ObservationLayout(clocked.tasks, without_phase(clocked.channels), history)
 
 
-def student_layout(policy: Any) -> ObservationLayout:
-    """The layout of a policy's observations, by its `env_kwargs`.
+def student_layout(student: MultiHeadPolicy) -> ObservationLayout:
+    """The layout of a student's observations.
 
     Raises:
-        InvalidInputError: if its observations have another size.
+        InvalidInputError: if it has no contract, or one that is not of a Go1's observation.
     """
-    kwargs = policy.env_kwargs
-    layout = ObservationLayout(
-        tuple(kwargs.get("tasks") or TASKS), kwargs.get("channels", ()), kwargs.get("history", 1)
-    )
-    if policy.observation_space.shape != (layout.size,):
-        raise InvalidInputError(
-            f"by its env_kwargs the policy's observations have {layout.size} entries, its space is "
-            f"{policy.observation_space.shape}"
-        )
+    contract = student.contract
+    if contract is None:
+        raise InvalidInputError("a student with a contract was expected: it says where command and phase stand")
+    layout = ObservationLayout(contract.tasks, contract.channels, contract.history)
+    if layout.size != contract.observation_size:
+        raise InvalidInputError(f"the student must see what a Go1's environment shows, got {contract.describe()}")
     return layout
 
 

@@ -1,23 +1,21 @@
-"""Students that come with the package."""
+"""Policies that come with the package."""
 
 from importlib import resources
-from typing import TYPE_CHECKING
 
-from go1_mtl_gym.errors import InvalidInputError
+import torch
 
-if TYPE_CHECKING:
-    import torch
-
-    from trainers.policies.multi_head import MultiHeadPolicy
-    from trainers.policies.phase_free import PhaseFreePolicy
+from go1_mtl_gym.validation import one_of
+from trainers.policies.loading import load
+from trainers.policies.multi_head import MultiHeadPolicy
+from trainers.policies.phase_free import PhaseFreePolicy
 
 PRETRAINED = ("clocked", "phase_free")
 """The student of the main job's default preset, and the same without a clock."""
 FOLDER = resources.files("trainers") / "assets"
 
 
-def load_pretrained(name: str = "clocked", device: "torch.device | str" = "cpu") -> "MultiHeadPolicy | PhaseFreePolicy":
-    """Read a policy that comes with the package, in evaluation mode; its `env_kwargs` make its environment.
+def load_pretrained(name: str = "clocked", device: torch.device | str = "cpu") -> MultiHeadPolicy | PhaseFreePolicy:
+    """Read a policy that comes with the package, in evaluation mode; its `make_env` makes its environment.
 
     Args:
         name: one of `PRETRAINED`.
@@ -26,10 +24,6 @@ def load_pretrained(name: str = "clocked", device: "torch.device | str" = "cpu")
     Raises:
         InvalidInputError: if there is no policy of that name in the package.
     """
-    from trainers.policies.checkpoint import load
-
-    there = [known for known in PRETRAINED if (FOLDER / f"{known}.zip").is_file()]
-    if name not in there:
-        raise InvalidInputError(f"the policies that come with the package are {there}, got {name!r}")
+    one_of(name, PRETRAINED, "name of a policy that comes with the package")
     with resources.as_file(FOLDER / f"{name}.zip") as path:
         return load(path, device)

@@ -1,0 +1,125 @@
+"""Trajectories that the MPC predicted, and the two options of the expert that remember them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from experts.mpc.srbd import COM, FORCE_UNIT, OMEGA, RPY, VELOCITY
+from go1_mtl_gym.gaits import Gait
+from go1_mtl_gym.sensing.state import RobotState
+
+
+class Frame:
+    """A frame on the ground below a point, turned about the vertical.
+
+    Args:
+        point_w: world [m], shape (3,); its height does not matter.
+        yaw: [rad].
+    """
+
+    def __init__(self, point_w: np.ndarray, yaw: float) -> None:
+        self.yaw = float(yaw)
+        self.origin_w = np.array([point_w[0], point_w[1], 0.0])
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        self.rotation = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+
+    def points(self, points_w: np.ndarray) -> np.ndarray:
+        """Points in this frame, shape (..., 3)."""
+        return (points_w - self.origin_w) @ self.rotation
+
+    def vectors(self, vectors_w: np.ndarray) -> np.ndarray:
+        """Vectors in this frame, shape (..., 3)."""
+        return vectors_w @ self.rotation
+
+    def states(self, states: np.ndarray, other: "Frame") -> np.ndarray:
+        """The MPC's states (n, 12) of another frame in this one."""
+        turn = other.rotation.T @ self.rotation
+        out = np.empty_like(states)
+        out[:, RPY] = states[:, RPY]
+        out[:, 2] += np.remainder(other.yaw - self.yaw + np.pi, 2 * np.pi) - np.pi
+        out[:, COM] = self.points(states[:, COM] @ other.rotation.T + other.origin_w)
+        out[:, OMEGA], out[:, VELOCITY] = states[:, OMEGA] @ turn, states[:, VELOCITY] @ turn
+        return out
+
+
+WORLD = Frame(np.zeros(3), 0.0)
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """What one solve predicted.
+
+    Attributes:
+        time_s: when it begins, in the episode's time [s].
+        gait: the contact plan that it was made for.
+        dt: interval [s].
+        states: x at the N + 1 ends of the intervals, shape (N + 1, 12).
+        inputs: u during the intervals, in units of `FORCE_UNIT`, shape (N, 12).
+        frame: that states and inputs are in.
+    """
+
+    time_s: float
+    gait: Gait
+    dt: float
+    states: np.ndarray
+    inputs: np.ndarray
+    frame: Frame = WORLD
+
+    def shifted(
+        self, time_s: float, frame: Frame, reference: np.ndarray, nominal: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """States and inputs of the same trajectory on a grid that begins later; the reference beyond its end.
+
+        Args:
+            time_s: beginning of the grid [s].
+            frame: of the answer, the reference and the nominal inputs.
+            reference: states of the reference on that grid, shape (N + 1, 12).
+            nominal: its inputs, shape (N, 12).
+        """
+        steps = len(self.inputs)
+        where = (time_s - self.time_s) / self.dt + np.arange(steps + 1)
+        low = np.clip(where.astype(int), 0, steps - 1)
+        share = (where - low)[:, None]
+        states = frame.states((1 - share) * self.states[low] + share * self.states[low + 1], self.frame)
+        beyond = where > steps + 1e-9
+        states[beyond] = reference[beyond]
+        middle = (where[:-1] + 0.5).astype(int)
+        forces = self.inputs[np.minimum(middle, steps - 1)].reshape(steps, 4, 3)
+        forces = frame.vectors(forces @ self.frame.rotation.T).reshape(steps, 12)
+        return states, np.where((middle < steps)[:, None], forces, nominal)
+
+    def forces_w(self, time_s: float) -> np.ndarray:
+        """Ground forces planned for a time within the horizon, world [N], shape (4, 3)."""
+        k = int((time_s - self.time_s) / self.dt + 1e-9)
+        forces = self.inputs[min(max(k, 0), len(self.inputs) - 1)].reshape(4, 3) * FORCE_UNIT
+        return forces @ self.frame.rotation.T
+
+
+class Recall:
+    """The last trajectory and the one before it; asking again at the same time changes nothing."""
+
+    def __init__(self) -> None:
+        self._last: Trajectory | None = None
+        self._before: Trajectory | None = None
+
+    def before(self, state: RobotState) -> Trajectory | None:
+        """The newest trajectory of this gait that began earlier than now; None if it is useless by now."""
+        for trajectory in (self._last, self._before):
+            if trajectory is not None and trajectory.gait == state.gait:
+                age = state.time_s - trajectory.time_s
+                if 0 < age < state.gait.period:
+                    return trajectory
+        return None
+
+    def at(self, state: RobotState, period_s: float) -> Trajectory | None:
+        """The last trajectory of this gait if it is younger than a period [s]; one that begins now is younger."""
+        last = self._last
+        if last is None or last.gait != state.gait or not -1e-9 < state.time_s - last.time_s < period_s - 1e-9:
+            return None
+        return last
+
+    def store(self, trajectory: Trajectory) -> None:
+        """Remember one; it replaces another of the same time."""
+        if self._last is not None and self._last.time_s < trajectory.time_s:
+            self._before = self._last
+        self._last = trajectory

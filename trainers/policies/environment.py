@@ -1,0 +1,81 @@
+"""What a policy knows of the environment that it is for."""
+
+import dataclasses
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from go1_mtl_gym.contract import PolicyContract
+from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.validation import one_of
+from trainers.data.environments import make_env
+
+
+class ForEnvironment:
+    """A policy that can make its environment.
+
+    Attributes:
+        contract: what gives its observations and actions their meaning; None for one that was made without.
+        extra_env_kwargs: JSON values that `go1_mtl_gym.Go1Env` was given beyond what the contract says.
+    """
+
+    contract: PolicyContract | None
+    extra_env_kwargs: dict[str, Any]
+
+    @property
+    def tasks(self) -> tuple[str, ...]:
+        """Names of the tasks in the order of the task id.
+
+        Raises:
+            InvalidInputError: if the policy has no contract that names them.
+        """
+        if self.contract is None:
+            raise InvalidInputError("a policy with a contract was expected: without one its tasks have no names")
+        return self.contract.tasks
+
+    @property
+    def env_kwargs(self) -> dict[str, Any]:
+        """Keyword arguments of `go1_mtl_gym.Go1Env` for the environment that the policy is for."""
+        return self.extra_env_kwargs | (self.contract.env_kwargs if self.contract else {})
+
+    def make_env(self, task: str | None = None, **env_kwargs: Any) -> gymnasium.Env:
+        """The environment that the policy is for.
+
+        Args:
+            task: name of a task; None draws one of the policy's per episode.
+            env_kwargs: of the environment, such as ``render_mode``; on top of the policy's own.
+
+        Raises:
+            InvalidInputError: if the policy does not have the task, or the arguments make an environment of another
+                contract.
+        """
+        if task is not None:
+            one_of(task, self.tasks, "task")
+        env = make_env(task, None, **{**self.env_kwargs, **env_kwargs})
+        if self.contract is not None:
+            self.contract.check(env.unwrapped.contract, "the policy", "the environment")
+        return env
+
+
+def json_arguments(env_kwargs: Mapping[str, Any]) -> dict[str, Any]:
+    """An environment's arguments as JSON values: numpy's numbers become Python's, frozen dataclasses dictionaries.
+
+    Raises:
+        InvalidInputError: if one of them has no such form, so that a policy with it could not be saved.
+    """
+    ready = {}
+    for name, value in env_kwargs.items():
+        plain = dataclasses.asdict(value) if dataclasses.is_dataclass(value) and not isinstance(value, type) else value
+        plain = plain.item() if isinstance(plain, np.generic) else plain
+        try:
+            json.dumps(plain, allow_nan=False)
+        except (TypeError, ValueError) as error:
+            raise InvalidInputError(
+                f"env_kwargs[{name!r}] must be a JSON value to be saved with the policy, got {value!r} "
+                '(an expert is named as "module:name")'
+            ) from error
+        ready[name] = plain
+    return ready
