@@ -53,7 +53,8 @@ def test_the_quickstart_of_the_readme_is_the_example():
 def test_the_quickstart_drives_a_policy(tmp_path, monkeypatch, capsys):
     kwargs = {"channels": ("command", "phase"), "control_hz": 100}
     env = trainers.make_env("trot", **kwargs)
-    policy = trainers.MultiHeadPolicy(env.observation_space, env.action_space, width=8, env_kwargs=kwargs, seed=0)
+    spaces = (env.observation_space, env.action_space)
+    policy = trainers.MultiHeadPolicy(*spaces, contract=env.unwrapped.contract, width=8, seed=0)
     policy.fit_normalization(*standing_rows(env))
     policy.save(tmp_path / "policy.zip")
     monkeypatch.setattr(sys, "argv", ["quickstart.py", str(tmp_path / "policy.zip")])
