@@ -1,13 +1,47 @@
-import sys
+"""A policy drives a Go1 for five seconds, and what it did is printed.
+
+python examples/quickstart.py                                       the policy that comes with the package
+python examples/quickstart.py runs/<date>/policy.zip --task walk    one that you trained
+python examples/quickstart.py --render                              in a window
+"""
+
+import argparse
+from collections.abc import Sequence
 
 import gymnasium as gym
 
+import go1_mtl_gym
 import trainers
+from trainers.utils.cli import main
 
-policy = trainers.load(sys.argv[1]) if len(sys.argv) > 1 else trainers.load_pretrained()
-env = gym.make("go1_mtl_gym:Go1Trot-v0", **policy.env_kwargs)
-obs, info = env.reset(seed=0, options={"command": (0.5, 0.0, 0.0)})
-for _ in range(250):
-    action, _ = policy.predict(obs, deterministic=True)
-    obs, reward, terminated, truncated, info = env.step(action)
-print(f"{info['task']}, fallen: {info['fallen']}, (vx, vy, yaw rate): {info['base_velocity'].round(2)}")
+
+@main
+def run(arguments: Sequence[str] | None = None) -> None:
+    """Make the environment that the policy was trained for, and let it drive."""
+    parser = argparse.ArgumentParser(description="Let a policy drive a Go1 and print what it does.")
+    parser.add_argument("policy", nargs="?", help="file of a trained policy (default: the one in the package)")
+    parser.add_argument("--task", choices=go1_mtl_gym.TASKS, default="trot", help="gait (default: trot)")
+    parser.add_argument("--command", nargs=3, type=float, default=(0.5, 0.0, 0.0), metavar=("VX", "VY", "YAW"))
+    parser.add_argument("--seconds", type=float, default=5.0, help="of robot time (default: 5)")
+    parser.add_argument("--render", action="store_true", help="open a window")
+    options = parser.parse_args(arguments)
+
+    policy = trainers.load(options.policy) if options.policy else trainers.load_pretrained()
+    render_mode = "human" if options.render else None
+    env = gym.make(go1_mtl_gym.env_id(options.task), render_mode=render_mode, **policy.env_kwargs)
+
+    obs, info = env.reset(seed=0, options={"command": tuple(options.command)})
+    state, fallen = None, False
+    for _ in range(round(options.seconds * env.unwrapped.control_hz)):
+        action, state = policy.predict(obs, state, deterministic=True)
+        obs, _, fallen, truncated, info = env.step(action)
+        if fallen or truncated:
+            break
+    env.close()
+    vx, vy, yaw_rate = info["base_velocity"]
+    print(f"{info['task']}: {'fell' if fallen else 'still up'}, {vx:.2f} m/s forward, {vy:.2f} m/s left,", end=" ")
+    print(f"{yaw_rate:.2f} rad/s; asked for {options.command[0]:g}, {options.command[1]:g}, {options.command[2]:g}")
+
+
+if __name__ == "__main__":
+    raise SystemExit(run())

@@ -1,5 +1,7 @@
 """Pictures of the robot, with its foot contacts and its command drawn in: off screen or in a window."""
 
+import ctypes.util
+import importlib
 import os
 import sys
 
@@ -8,6 +10,7 @@ import numpy as np
 
 from go1_mtl_gym.errors import Go1Error
 from go1_mtl_gym.robot import FOOT_RADIUS
+from go1_mtl_gym.rotations import yaw_matrix
 from go1_mtl_gym.sensing.state import RobotState
 from go1_mtl_gym.sim.simulation import Simulation
 
@@ -23,14 +26,48 @@ class RenderingError(Go1Error, RuntimeError):
     """No picture can be drawn on this machine."""
 
 
+def choose_backend() -> None:
+    """On Linux without a display, let MuJoCo draw by EGL, or by OSMesa where only that is installed.
+
+    MuJoCo reads the environment variable MUJOCO_GL once, when it is imported, and takes GLFW if it is not set, which
+    needs a display. So the module that reads it is loaded again here, before the first picture. A choice that the user
+    has made stays, and child processes inherit ours.
+    """
+    if not sys.platform.startswith("linux") or "MUJOCO_GL" in os.environ or has_display():
+        return
+    only_osmesa = ctypes.util.find_library("OSMesa") and not ctypes.util.find_library("EGL")
+    os.environ["MUJOCO_GL"] = "osmesa" if only_osmesa else "egl"
+    try:
+        importlib.reload(sys.modules[mujoco.Renderer.__module__].gl_context)
+    except Exception:  # no such library; child processes would fail to import MuJoCo
+        del os.environ["MUJOCO_GL"]
+        raise
+
+
+def has_display() -> bool:
+    """Whether a window system is there, as X11 and Wayland announce it."""
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def why_no_pictures() -> str:
+    """Draw one small picture off screen; the empty string, or what went wrong."""
+    try:
+        choose_backend()
+        model = mujoco.MjModel.from_xml_string("<mujoco/>")
+        with mujoco.Renderer(model, 16, 16) as renderer:
+            renderer.render()
+    except Exception as error:  # the type differs from one OpenGL backend to the next
+        return f"no OpenGL (MUJOCO_GL={os.environ.get('MUJOCO_GL', 'unset')}): {error}"
+    return ""
+
+
 def annotate(scene: mujoco.MjvScene, simulation: Simulation, state: RobotState) -> None:
     """Add to a scene: a disc under each foot on the ground, the command (green) and the velocity (blue) as arrows."""
     for foot, contact in zip(simulation.feet_w, state.contacts, strict=True):
         if contact:
             size = [2.2 * FOOT_RADIUS, 2.2 * FOOT_RADIUS, 0.002]
             _add(scene, mujoco.mjtGeom.mjGEOM_ELLIPSOID, size, [*foot[:2], 0.003], CONTACT_COLOR)
-    yaw = state.rpy[2]
-    turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
+    turn = yaw_matrix(state.rpy[2])
     above = state.position_w + [0.0, 0.0, 0.22]
     for velocity, color, lift in (
         (state.command, COMMAND_COLOR, 0.03),
@@ -67,6 +104,7 @@ class Camera:
     def __init__(self, simulation: Simulation, width: int, height: int) -> None:
         self._simulation = simulation
         try:
+            choose_backend()
             self._renderer = mujoco.Renderer(simulation.model, height, width)
         except Exception as error:  # the type differs from one OpenGL backend to the next
             raise RenderingError(
@@ -97,7 +135,7 @@ class Viewer:
 
     def __init__(self, simulation: Simulation, width: int, height: int) -> None:
         # without a display GLFW ends the whole process instead of raising
-        if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        if sys.platform.startswith("linux") and not has_display():
             raise RenderingError('cannot open a window: there is no display; use render_mode="rgb_array"')
         import mujoco.viewer
 

@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from trainers.evaluation.metrics import offline_metrics
     from trainers.evaluation.scoring import ClosedLoopResult, EpisodeRecord
     from trainers.evaluation.video import record_frames, save_gif, tile
+    from trainers.pipeline.config import JobConfig
+    from trainers.pipeline.job import Job
     from trainers.policies.checkpoint import CheckpointError
     from trainers.policies.expert_policy import ExpertPolicy
     from trainers.policies.loading import load
@@ -51,6 +53,8 @@ _HOME = {
     "Demonstrations": "data.demonstrations",
     "EpisodeRecord": "evaluation.scoring",
     "ExpertPolicy": "policies.expert_policy",
+    "Job": "pipeline.job",
+    "JobConfig": "pipeline.config",
     "Learner": "policies.stateful",
     "MultiHeadPolicy": "policies.multi_head",
     "MultiTaskLoss": "algorithms.losses",

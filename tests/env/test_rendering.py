@@ -10,7 +10,7 @@ import pytest
 
 from go1_mtl_gym import robot
 from go1_mtl_gym.env import Go1Env
-from go1_mtl_gym.rendering import CONTACT_COLOR, annotate
+from go1_mtl_gym.rendering import CONTACT_COLOR, annotate, why_no_pictures
 
 
 @pytest.fixture
@@ -40,7 +40,11 @@ def test_pictures_follow_the_robot(env):
 @pytest.mark.gl
 def test_a_command_draws_a_green_arrow(env):
     before = env.render().astype(int)
-    env._episode.filtered_command[:] = [0.6, 0.0, 0.0]
+    snapshot = env.simulation.snapshot()
+    env.set_command((0.6, 0.0, 0.0))
+    for _ in range(30):
+        env.step(env.action_map.from_radians(robot.HOME_POSE))
+    env.simulation.restore(snapshot)
     after = env.render().astype(int)
     changed = (after != before).any(axis=2)
     assert 10 < changed.sum() < changed.size / 4
@@ -131,3 +135,38 @@ def test_off_screen_without_open_gl_says_what_to_try():
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems always have a display")
 def test_a_window_without_a_display_says_what_to_do_instead():
     assert "rgb_array" in refusal("human", "egl")
+
+
+_WITHOUT_A_CHOICE = """
+import os, sys
+import mujoco
+from go1_mtl_gym.env import Go1Env
+env = Go1Env("trot", render_mode="rgb_array", width=32, height=32)
+env.reset(seed=0)
+assert "MUJOCO_GL" not in os.environ, "nothing is chosen before the first picture"
+assert env.render().std() > 5
+print(os.environ["MUJOCO_GL"])
+"""
+
+
+@pytest.mark.gl
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems always have a display")
+def test_the_first_picture_needs_no_display_and_no_environment_variable():
+    kept = {
+        name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY", "MUJOCO_GL")
+    }
+    done = subprocess.run(
+        [sys.executable, "-c", _WITHOUT_A_CHOICE],
+        env=kept | {"PYTHONPATH": os.pathsep.join(sys.path)},
+        capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+    assert done.stdout.strip() in ("egl", "osmesa"), done.stderr
+
+
+def test_a_picture_that_cannot_be_drawn_has_a_reason(monkeypatch):
+    def refuse(*_):
+        raise RuntimeError("no framebuffer")
+
+    monkeypatch.setattr(mujoco, "Renderer", refuse)
+    monkeypatch.setenv("MUJOCO_GL", "egl")
+    assert why_no_pictures() == "no OpenGL (MUJOCO_GL=egl): no framebuffer"

@@ -17,6 +17,7 @@ from go1_mtl_gym.errors import Go1Error, InvalidInputError
 from go1_mtl_gym.sensing.observation import ObservationLayout
 from trainers.data.demonstrations import Demonstrations
 from trainers.data.environments import EnvFactory, PerturbationConfig, WithTasks, derive_seed, make_env
+from trainers.utils.processes import keep_interrupts
 
 BEFORE_FALL_S = 0.24
 """The last seconds before a fall are not worth imitating and are dropped [s]."""
@@ -219,7 +220,9 @@ def collect_all(
                 bar.update()
         elif todo:
             tasks = (joblib.delayed(WithTasks(_make_shard))(job, path, make_env) for job, path in todo)
-            for _ in joblib.Parallel(n_jobs=n_jobs, return_as="generator_unordered")(tasks):
+            with keep_interrupts():
+                finished = joblib.Parallel(n_jobs=n_jobs, return_as="generator_unordered")(tasks)
+            for _ in finished:
                 bar.update()
     return paths
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import multiprocessing
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -11,11 +12,16 @@ import numpy as np
 
 import go1_mtl_gym
 from go1_mtl_gym.contract import PolicyContract
-from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.errors import Go1Error, InvalidInputError
 from go1_mtl_gym.validation import interval_s, number_in
+from trainers.utils.processes import keep_interrupts
 
 EnvFactory = Callable[..., gymnasium.Env]
 """What `make_env` is: (task, perturbation=None, **env_kwargs) -> environment with a method ``expert_action``."""
+
+
+class WorkerError(Go1Error, RuntimeError):
+    """A process that was to step an environment is gone."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -91,8 +97,13 @@ def make_venv(
         per_task: how many of each.
         env_kwargs: of `make_env`.
         perturbation: of `make_env`.
-        subproc: one process per environment instead of one for all.
+        subproc: one process per environment instead of one for all. The processes import the main script again, so it
+            must make them below ``if __name__ == "__main__":``.
         make_env: another factory, for tests and other robots.
+
+    Raises:
+        InvalidInputError: if `per_task` is less than 1.
+        WorkerError: if a process ends before it has made its environment.
     """
     from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv
 
@@ -101,7 +112,18 @@ def make_venv(
     kwargs = dict(env_kwargs or {})
     calls = [functools.partial(make_env, task, perturbation, **kwargs) for task in tasks]
     thunks = [WithTasks(call) for call in calls for _ in range(per_task)]
-    return SubprocVecEnv(thunks, start_method="spawn") if subproc else DummyVecEnv(thunks)
+    if not subproc:
+        return DummyVecEnv(thunks)
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
+        raise SystemExit(1)  # a worker that imports a script without a main guard; the script is told, by its own error
+    try:
+        with keep_interrupts():
+            return SubprocVecEnv(thunks, start_method="spawn")
+    except (EOFError, ConnectionError):
+        raise WorkerError(
+            "a worker process ended before it had made its environment; a script that makes environments with "
+            'subproc=True must do so below `if __name__ == "__main__":`, because every worker imports it again'
+        ) from None
 
 
 def contracts_of(venv: Any) -> tuple[PolicyContract, ...]:

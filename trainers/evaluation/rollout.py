@@ -14,6 +14,7 @@ from go1_mtl_gym.expert import check_expert_fits
 from trainers.data.environments import EnvFactory, WithTasks
 from trainers.evaluation.scoring import Series
 from trainers.policies.stateful import Learner
+from trainers.utils.processes import keep_interrupts
 
 
 def controller(policy_or_expert: Any, env: Any) -> Callable[[np.ndarray], np.ndarray]:
@@ -161,5 +162,6 @@ def run_all(
     if n_jobs == 1:
         return [episode(*call) for call in tqdm(calls, title, count, disable=not progress)]
     parallel = joblib.Parallel(n_jobs=n_jobs, return_as="generator")
-    results = parallel(joblib.delayed(WithTasks(episode))(*call) for call in calls)
+    with keep_interrupts():
+        results = parallel(joblib.delayed(WithTasks(episode))(*call) for call in calls)
     return list(tqdm(results, title, count, disable=not progress))

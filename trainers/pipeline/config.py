@@ -1,0 +1,256 @@
+"""Settings of the main job: fields that are checked once, and what follows from them for each stage."""
+
+import dataclasses
+import operator
+import os
+from collections.abc import Sequence
+from numbers import Real
+from typing import Any
+
+import numpy as np
+
+from go1_mtl_gym import PAPER_TASKS, DomainRandomization
+from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.sensing.observation import CHANNELS
+from go1_mtl_gym.tasks import check_task_names
+from go1_mtl_gym.validation import interval_s, number_in, one_of
+from trainers.algorithms.bc import BCConfig
+from trainers.algorithms.dagger import DAggerConfig
+from trainers.algorithms.phase_free import PhaseConfig
+from trainers.data.environments import PerturbationConfig
+from trainers.pipeline.presets import PRESETS
+from trainers.policies.normalization import MODES
+from trainers.utils.files import json_ready
+
+NOISE_RAD = 0.06
+"""Largest standard deviation of the noise on the expert's actions in perturbed demonstrations [rad]."""
+ROUND_NOISE_RAD = 0.02
+"""The same in DAgger rounds, where the learner perturbs enough [rad]."""
+DEVICES = ("cpu", "cuda")
+
+
+def _from(low: float, default: Any, above: bool = False) -> Any:
+    """A field of a number that is at least `low`, or greater than it."""
+    return dataclasses.field(default=default, metadata={"low": low, "above": above})
+
+
+@dataclasses.dataclass(frozen=True)
+class JobConfig:
+    """What the main job does; all durations are seconds of robot time per task.
+
+    Numbers may be numpy's; they are kept as Python's, so that every configuration can be written to a file.
+
+    Attributes:
+        preset: name of the preset that the rest started from.
+        tasks: which gaits, in head order.
+        rounds: DAgger rounds.
+        seed: of everything random.
+        n_envs: worker processes.
+        device: of the training, "cpu" or "cuda".
+        threads: of the training on a CPU; their number can change the last digits of a result.
+        channels: optional parts of the observation.
+        history: proprioceptive frames in the observation.
+        control_hz: rate of the policy [Hz].
+        kp, kd: gains of the actuators [N m/rad, N m s/rad].
+        clean_s, perturbed_s, held_out_s: demonstrations: undisturbed, perturbed, and undisturbed for the R2.
+        randomized: fraction of the perturbed episodes whose physics and sensor noise are drawn, by the ranges of
+            `go1_mtl_gym.DomainRandomization`.
+        task_interval: shortest and longest time between changes of gait in perturbed episodes, or None.
+        corner_fraction: probability with which a new command in them is a corner of its range.
+        shard_s: length of a shard, which begins with a standing start.
+        dagger_s: recorded in each DAgger round.
+        takeover_rad: of the DAgger rounds, see `trainers.DAggerConfig`.
+        width: units of each hidden layer.
+        normalization: of inputs and outputs, see `trainers.MultiHeadPolicy`.
+        batch_size: rows per gradient step.
+        clone_steps, round_steps: gradient steps of cloning and of each round.
+        phase_free_s: the policy's walks that the phase-free policy learns the phase from, per gait; 0 makes none.
+        phase_free_history: frames of proprioception that it reads.
+        phase_free_steps: gradient steps of its phase estimator.
+        episodes, episode_s, command_interval: of the closed-loop evaluation, per task and agent; a new command comes
+            every so many seconds.
+        round_episodes: episodes per task after each DAgger round.
+        video_s: length of the videos.
+
+    Raises:
+        InvalidInputError: if a setting cannot be.
+    """
+
+    preset: str = "default"
+    tasks: tuple[str, ...] = PAPER_TASKS
+    rounds: int = _from(0, 3)
+    seed: int = _from(0, 0)
+    n_envs: int = _from(1, os.cpu_count() or 1)
+    device: str = "cpu"
+    threads: int = _from(1, 1)
+    channels: tuple[str, ...] = ("command", "phase", "last_action")
+    history: int = _from(1, 1)
+    control_hz: int = _from(1, 50)
+    kp: float = _from(0, 50.0, above=True)
+    kd: float = _from(0, 2.0)
+    clean_s: float = _from(0, 60.0)
+    perturbed_s: float = _from(0, 300.0)
+    held_out_s: float = _from(0, 60.0, above=True)
+    randomized: float = _from(0, 0.3)
+    task_interval: tuple[float, float] | None = (2.0, 6.0)
+    corner_fraction: float = _from(0, 0.25)
+    shard_s: float = _from(0, 15.0, above=True)
+    dagger_s: float = _from(0, 60.0, above=True)
+    takeover_rad: float | None = _from(0, None, above=True)
+    width: int = _from(1, 256)
+    normalization: str = "mean_std"
+    batch_size: int = _from(1, 1024)
+    clone_steps: int = _from(1, 7000)
+    round_steps: int = _from(1, 2500)
+    phase_free_s: float = _from(0, 240.0)
+    phase_free_history: int = _from(1, 10)
+    phase_free_steps: int = _from(1, 4000)
+    episodes: int = _from(1, 20)
+    episode_s: float = _from(0, 30.0, above=True)
+    command_interval: float = _from(0, 5.0, above=True)
+    round_episodes: int = _from(1, 2)
+    video_s: float = _from(0, 4.0, above=True)
+
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):
+            if "low" in field.metadata:
+                object.__setattr__(self, field.name, _number(getattr(self, field.name), field))
+        object.__setattr__(self, "tasks", check_task_names(self.tasks))
+        object.__setattr__(self, "channels", _names(self.channels))
+        object.__setattr__(self, "task_interval", interval_s(self.task_interval, "task_interval"))
+        one_of(self.normalization, MODES, "normalization")
+        one_of(str(self.device).partition(":")[0], DEVICES, "device")
+        for name in ("randomized", "corner_fraction"):
+            number_in(getattr(self, name), 0.0, 1.0, name)
+        if min(self.shards(self.clean_s) + self.shards(self.perturbed_s), self.shards(self.held_out_s)) < 1:
+            raise InvalidInputError(
+                f"clean_s + perturbed_s and held_out_s must each fill a shard of shard_s = {self.shard_s:g} s, "
+                f"got {self.clean_s:g} + {self.perturbed_s:g} and {self.held_out_s:g}"
+            )
+
+    # -- Other settings ------------------------------------------------------------------------------------------------
+
+    @classmethod
+    def from_preset(cls, name: str, **options: Any) -> "JobConfig":
+        """Settings of a preset, some of them replaced.
+
+        Args:
+            name: one of `PRESETS`.
+            options: fields of this class.
+
+        Raises:
+            InvalidInputError: if there is no such preset or field, or a value cannot be.
+        """
+        return cls(preset=one_of(name, tuple(PRESETS), "preset")).with_options(**(PRESETS[name] | options))
+
+    def with_options(self, **options: Any) -> "JobConfig":
+        """A copy with other values of some fields.
+
+        Raises:
+            InvalidInputError: if there is no such field, or a value cannot be.
+        """
+        names = [field.name for field in dataclasses.fields(self)]
+        for name in options:
+            one_of(name, names, "setting of the main job")
+        return dataclasses.replace(self, **options)
+
+    # -- What follows for the stages -----------------------------------------------------------------------------------
+
+    @property
+    def env_kwargs(self) -> dict[str, Any]:
+        """Of the environments that demonstrations are collected in and policies act in."""
+        names = ("tasks", "channels", "history", "control_hz", "kp", "kd")
+        return {name: getattr(self, name) for name in names}
+
+    @property
+    def literal_env_kwargs(self) -> dict[str, Any]:
+        """Of the paper-literal policy: the 34 numbers and the task id."""
+        return self.env_kwargs | {"channels": (), "history": 1}
+
+    @property
+    def randomization_kwargs(self) -> dict[str, Any]:
+        """What environments of perturbed episodes and of rounds have on top of `env_kwargs`."""
+        return {"randomization": DomainRandomization(fraction=self.randomized)} if self.randomized else {}
+
+    def perturbation(self, noise_rad: float) -> PerturbationConfig:
+        """How an episode is perturbed, with action noise of at most `noise_rad` [rad]."""
+        several = len(self.tasks) > 1
+        return PerturbationConfig(
+            noise_rad=noise_rad,
+            corner_fraction=self.corner_fraction,
+            task_interval=self.task_interval if several else None,
+        )
+
+    def shards(self, seconds: float) -> int:
+        """How many shards hold the seconds of one task."""
+        return round(seconds / self.shard_s)
+
+    @property
+    def is_literal(self) -> bool:
+        """Whether the policy sees what the paper's sees, and the paper-literal baseline would be the same again."""
+        return not self.channels and self.history == 1
+
+    @property
+    def has_clock(self) -> bool:
+        """Whether the policy sees a gait clock and a command, and so can do without the clock later."""
+        return {"command", "phase"} <= set(self.channels) and self.history == 1
+
+    @property
+    def bc(self) -> BCConfig:
+        """How to clone."""
+        interval = max(50, self.clone_steps // 30)  # each entry of the log costs a pass over the held-out rows
+        return BCConfig(steps=self.clone_steps, batch_size=self.batch_size, log_interval=interval, seed=self.seed)
+
+    @property
+    def round_bc(self) -> BCConfig:
+        """How to train in a DAgger round."""
+        return dataclasses.replace(self.bc, steps=self.round_steps, learning_rate=1e-3)
+
+    @property
+    def baseline_bc(self) -> BCConfig:
+        """How to train a baseline: with as many gradient steps as the policy got in all."""
+        return dataclasses.replace(self.bc, steps=self.clone_steps + self.rounds * self.round_steps)
+
+    @property
+    def dagger(self) -> DAggerConfig:
+        """How to collect a DAgger round."""
+        return DAggerConfig(seconds_per_task=self.dagger_s, takeover_rad=self.takeover_rad, seed=self.seed)
+
+    @property
+    def phase(self) -> PhaseConfig:
+        """How to train the phase estimator."""
+        return PhaseConfig(steps=self.phase_free_steps, seed=self.seed)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The settings as JSON values."""
+        return json_ready(dataclasses.asdict(self))
+
+
+def _number(value: Any, field: "dataclasses.Field[Any]") -> int | float | None:
+    """A field's value as Python's own number, checked against the field's lower bound."""
+    if value is None and field.default is None:
+        return None
+    low, above = field.metadata["low"], field.metadata["above"]
+    kind = "an integer" if field.type is int else "a number"
+    expected = f"{field.name} must be {kind} {'greater than' if above else 'of at least'} {low}, got {value!r}"
+    try:
+        if isinstance(value, (bool, np.bool_)):
+            raise TypeError
+        number = operator.index(value) if field.type is int else _finite(value)
+    except (TypeError, ValueError) as error:
+        raise InvalidInputError(expected) from error
+    if number < low or (above and number == low):
+        raise InvalidInputError(expected)
+    return number
+
+
+def _finite(value: object) -> float:
+    if not isinstance(value, Real) or not np.isfinite(float(value)):
+        raise TypeError
+    return float(value)
+
+
+def _names(channels: Sequence[str]) -> tuple[str, ...]:
+    if isinstance(channels, str):
+        raise InvalidInputError(f"channels must be a sequence of names of channels, got {channels!r}")
+    return tuple(one_of(name, tuple(CHANNELS), "channel") for name in channels)

@@ -1,0 +1,265 @@
+"""The main job: stages that leave their results on disk, and take from there what is done."""
+
+import contextlib
+from collections.abc import Iterator, Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import torch
+from stable_baselines3.common.vec_env import VecEnv
+
+from trainers.algorithms.bc import train_bc
+from trainers.algorithms.dagger import DAggerTrainer
+from trainers.algorithms.phase_free import train_phase_free
+from trainers.data.collection import collect_all
+from trainers.data.demonstrations import Demonstrations
+from trainers.data.environments import make_venv
+from trainers.evaluation.closed_loop import evaluate
+from trainers.evaluation.figures import joint_target_figure
+from trainers.evaluation.metrics import offline_metrics
+from trainers.pipeline.baselines import baseline_names, train_baselines
+from trainers.pipeline.config import NOISE_RAD, ROUND_NOISE_RAD, JobConfig
+from trainers.pipeline.demonstrations import held_out_jobs, training_jobs
+from trainers.pipeline.new_policy import new_policy
+from trainers.pipeline.pictures import save_videos
+from trainers.pipeline.run_folder import RunFolder, read_json
+from trainers.policies.checkpoint import versions
+from trainers.policies.loading import load
+from trainers.policies.multi_head import MultiHeadPolicy
+from trainers.utils.files import json_ready, write_json
+from trainers.utils.logging import log_figure, log_round, log_text, make_logger
+
+
+class Job:
+    """One training run in one folder.
+
+    Each stage is a method that leaves its result in the folder and, called again, takes it from there; a job that was
+    interrupted is made again with the same settings and folder, and goes on.
+
+    Args:
+        config: what to do.
+        out: folder of the results; made if missing.
+        command: how the run was started, for `metrics.json`.
+        progress: show bars.
+
+    Attributes:
+        folder: paths of the results, and the wall time of every stage.
+        logger: of the run, in TensorBoard's format.
+
+    Raises:
+        InvalidInputError: if a setting cannot be, or the folder cannot be written to or holds another run.
+    """
+
+    def __init__(
+        self, config: JobConfig, out: str | PathLike[str], *, command: str = "", progress: bool = False
+    ) -> None:
+        self.config = config
+        self.command = command
+        self.progress = progress
+        torch.set_num_threads(config.threads)
+        self._untrained()  # refuses impossible settings before anything is written
+        self.folder = RunFolder(Path(out))
+        self.folder.claim(config)
+        self.logger = make_logger(self.folder.tensorboard)
+        log_text(self.logger, "configuration", config.as_dict())
+
+    def run(self) -> dict[str, Any]:
+        """All stages, in order; returns what ``metrics.json`` holds.
+
+        Raises:
+            go1_mtl_gym.rendering.RenderingError: if no picture can be drawn on this machine; all else is done then.
+        """
+        train, held_out = self.demonstrations()
+        policy = self.dagger(self.clone(train, held_out), train, held_out)
+        metrics = self.evaluate({"multi_head": policy} | self.phase_free(policy) | self.baselines(), held_out)
+        self.draw(policy, held_out)
+        return metrics
+
+    # -- Demonstrations ------------------------------------------------------------------------------------------------
+
+    def demonstrations(self) -> tuple[Demonstrations, Demonstrations]:
+        """Training rows (clean and perturbed) and held-out rows (clean, other commands and seeds)."""
+        train, held_out = training_jobs(self.config), held_out_jobs(self.config)
+        with self.folder.stage("demonstrations"):
+            folder = self.folder.path / "demonstrations"
+            paths = collect_all(train + held_out, folder, self.config.n_envs, progress=self.progress)
+        shards = [Demonstrations.load(path) for path in paths]
+        return Demonstrations.concatenate(shards[: len(train)]), Demonstrations.concatenate(shards[len(train) :])
+
+    # -- Training ------------------------------------------------------------------------------------------------------
+
+    def clone(self, train: Demonstrations, held_out: Demonstrations) -> MultiHeadPolicy:
+        """The multi-head policy, cloned from the training rows."""
+        path = self.folder.cloned
+        if path.is_file():
+            return MultiHeadPolicy.load(path, self.config.device)
+        policy = self._untrained()
+        with self.folder.stage("clone"):
+            train_bc(policy, train, self.config.bc, held_out, self.logger, progress=self.progress)
+        policy.save(path)
+        return policy
+
+    def dagger(self, policy: MultiHeadPolicy, train: Demonstrations, held_out: Demonstrations) -> MultiHeadPolicy:
+        """The cloned policy after the DAgger rounds; saves it and all rows that it learned from."""
+        rows = train
+        if self.config.rounds:
+            rows = self._rounds(policy, train, held_out)
+        rows.save(self.folder.all_rows)
+        policy.save(self.folder.policy)
+        return policy
+
+    def _rounds(self, policy: MultiHeadPolicy, train: Demonstrations, held_out: Demonstrations) -> Demonstrations:
+        """Train a policy in all rounds, in place; returns all rows."""
+        with self._venv() as venv, self.folder.stage("dagger"):
+            trainer = DAggerTrainer(
+                venv,
+                policy,
+                train,
+                self.config.dagger,
+                self.config.round_bc,
+                scratch_dir=self.folder.path / "dagger",
+                logger=self.logger,
+                validation=held_out,
+                progress=self.progress,
+            )
+            if trainer.round_num == 0:
+                self._log_round(policy, held_out, 0)
+            trainer.run(self.config.rounds, lambda _, done: self._log_round(policy, held_out, done))
+        return trainer.rows
+
+    @contextlib.contextmanager
+    def _venv(self) -> Iterator[VecEnv]:
+        """One environment per task, as DAgger rounds want them."""
+        config = self.config
+        kwargs = config.env_kwargs | config.randomization_kwargs
+        perturbation = config.perturbation(ROUND_NOISE_RAD)
+        venv = make_venv(config.tasks, 1, kwargs, perturbation, subproc=config.n_envs > 1)
+        try:
+            yield venv
+        finally:
+            with contextlib.suppress(EOFError, OSError):  # if a process has died, that is the error to be seen
+                venv.close()
+
+    def _log_round(self, policy: MultiHeadPolicy, held_out: Demonstrations, round_num: int) -> None:
+        """A quick look at the closed loop and the one-step errors, for TensorBoard."""
+        agent = f"round-{round_num}"
+        episodes = self.config.round_episodes
+        closed_loop = {task: self.closed_loop(policy, agent, task, episodes) for task in self.config.tasks}
+        log_round(self.logger, round_num, closed_loop, offline_metrics(policy, held_out))
+
+    def phase_free(self, policy: MultiHeadPolicy) -> dict[str, Any]:
+        """The policy with an estimate of the phase in its clock's place, by name; nothing where it has no clock."""
+        config, path = self.config, self.folder.phase_free
+        if not (config.phase_free_s and config.has_clock):
+            return {}
+        if not path.is_file():
+            with self.folder.stage("phase_free"):
+                phase_free = train_phase_free(
+                    policy,
+                    config.phase_free_s,
+                    config.phase_free_history,
+                    perturbation=config.perturbation(NOISE_RAD),
+                    config=config.phase,
+                    seed=config.seed,
+                    progress=self.progress,
+                    **config.randomization_kwargs,
+                )
+            phase_free.save(path)
+        return {"phase_free": load(path)}
+
+    def baselines(self) -> dict[str, Any]:
+        """The pooled and the paper-literal policy by name, trained on the same rows with as many gradient steps."""
+        paths = {name: self.folder.parts / f"{name}.zip" for name in baseline_names(self.config)}
+        missing = [name for name, path in paths.items() if not path.is_file()]
+        if missing:
+            with self.folder.stage("baselines"):
+                train_baselines(self.config, missing, self.folder.parts, self.progress)
+        return {name: load(path) for name, path in paths.items()}
+
+    # -- Evaluation ----------------------------------------------------------------------------------------------------
+
+    def evaluate(self, policies: Mapping[str, Any], held_out: Demonstrations) -> dict[str, Any]:
+        """One-step errors and closed loop of the policies and the expert; writes and returns ``metrics.json``.
+
+        Args:
+            policies: by the names that `clone`, `phase_free` and `baselines` give them.
+            held_out: rows that none of them learned from.
+        """
+        tasks = self._one_step_errors(policies, held_out)
+        with self.folder.stage("evaluation"):
+            for name, policy in {"expert": "expert", **policies}.items():
+                for task in self.config.tasks:
+                    scores = self.closed_loop(policy, name, task, self.config.episodes)
+                    tasks[task].setdefault(name, {}).update(scores)
+        metrics = {
+            "tasks": tasks,
+            "config": self.config.as_dict(),
+            "seed": self.config.seed,
+            "versions": versions(),
+            "seconds": self.folder.seconds,
+            "command": self.command,
+        }
+        write_json(self.folder.metrics, metrics)
+        return metrics
+
+    def _one_step_errors(
+        self, policies: Mapping[str, Any], held_out: Demonstrations
+    ) -> dict[str, dict[str, dict[str, Any]]]:
+        """Task -> policy -> metric."""
+        tasks: dict[str, dict[str, dict[str, Any]]] = {task: {} for task in self.config.tasks}
+        for name, policy in policies.items():
+            if name == "phase_free":  # these rows hold one frame, it needs several
+                continue
+            rows = held_out.proprioceptive() if name == "paper_literal" else held_out
+            for task, scores in offline_metrics(policy, rows).items():
+                tasks[task][name] = scores
+        return tasks
+
+    def closed_loop(self, policy: Any, agent: str, task: str, episodes: int) -> dict[str, Any]:
+        """Scores of `trainers.evaluate`, kept on disk; "episodes" is their number.
+
+        Args:
+            policy: as `trainers.evaluate` takes it.
+            agent: its name in the run.
+            task: name of the task.
+            episodes: how many.
+        """
+        path = self.folder.closed_loop(agent, task)
+        known = read_json(path)
+        if known is None:
+            known = self._measured(policy, task, episodes) | {"learner": agent}
+            write_json(path, known)
+        kept = {key: value for key, value in known.items() if key not in ("task", "learner", "episodes", "seconds")}
+        return kept | {"episodes": len(known["episodes"])}
+
+    def _measured(self, policy: Any, task: str, episodes: int) -> dict[str, Any]:
+        config = self.config
+        result = evaluate(
+            policy,
+            task,
+            episodes=episodes,
+            seconds=config.episode_s,
+            seed=config.seed + 1,
+            command_interval=config.command_interval,
+            n_jobs=config.n_envs,
+            progress=self.progress,
+            **(config.env_kwargs if policy == "expert" else {}),
+        )
+        return json_ready(result.as_dict())
+
+    # -- Pictures ------------------------------------------------------------------------------------------------------
+
+    def draw(self, policy: MultiHeadPolicy, held_out: Demonstrations) -> None:
+        """Write ``joint_targets.png``, ``<task>.gif`` and ``gaits.gif``.
+
+        Raises:
+            go1_mtl_gym.rendering.RenderingError: if no video can be drawn on this machine.
+        """
+        figure = joint_target_figure(policy, held_out)
+        figure.savefig(self.folder.path / "joint_targets.png", dpi=120)
+        log_figure(self.logger, "joint_targets", figure)
+        save_videos(policy, self.config.tasks, self.config.video_s, self.folder.path, self.progress)
+
+    def _untrained(self) -> MultiHeadPolicy:
+        return new_policy(self.config, self.config.env_kwargs)

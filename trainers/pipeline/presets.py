@@ -1,0 +1,45 @@
+"""Named settings of the main job."""
+
+import os
+from typing import Any
+
+PRESETS: dict[str, dict[str, Any]] = {
+    "default": {},
+    "smoke": {
+        "rounds": 1,
+        "clean_s": 3.0,
+        "perturbed_s": 6.0,
+        "held_out_s": 3.0,
+        "shard_s": 3.0,
+        "dagger_s": 2.0,
+        "width": 64,
+        "batch_size": 256,
+        "clone_steps": 300,
+        "round_steps": 100,
+        "phase_free_s": 2.0,
+        "phase_free_steps": 100,
+        "episodes": 2,
+        "episode_s": 5.0,
+        "round_episodes": 1,
+        "video_s": 1.0,
+    },
+    # arXiv 2505.08574: 20 commands of 30 s per gait at 1 kHz, clean; min-max scaling; 2560 units; no DAgger.
+    "paper": {
+        "rounds": 0,
+        "channels": (),
+        "control_hz": 1000,
+        "clean_s": 600.0,
+        "perturbed_s": 0.0,
+        "randomized": 0.0,
+        "task_interval": None,
+        "phase_free_s": 0.0,
+        "held_out_s": 60.0,
+        "shard_s": 30.0,
+        "width": 2560,
+        "threads": os.cpu_count() or 1,
+        "normalization": "min_max",
+        "clone_steps": 30_000,
+        "episodes": 5,
+    },
+}
+"""Name -> what differs from the defaults of `JobConfig`."""
