@@ -3,15 +3,24 @@
 import inspect
 import re
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import MISSING, fields
-from typing import Any
+from dataclasses import fields
 
-from examples.main_job.config import PRESETS, JobConfig
-from go1_mtl_gym import TASKS, DomainRandomization, Go1Env, SensorNoise, env_id, robot
-from go1_mtl_gym.actuation import ActionMap, PDGains
-from go1_mtl_gym.rewards import RewardWeights
+from go1_mtl_gym import (
+    TASKS,
+    DomainRandomization,
+    EnvConfig,
+    PDGains,
+    PhysicsParams,
+    RewardWeights,
+    SensorNoise,
+    env_id,
+    robot,
+)
+from go1_mtl_gym.actuation import ActionMap
 from go1_mtl_gym.sensing.observation import CHANNELS, UNITS, ObservationLayout
-from go1_mtl_gym.sim.physics_params import PhysicsParams
+from trainers.pipeline.command_line import job_parser
+from trainers.pipeline.config import JobConfig
+from trainers.pipeline.presets import PRESETS
 
 CONTENT = {
     "accelerometer": "specific force at the IMU, trunk frame",
@@ -122,12 +131,12 @@ def _layout_table(layout: ObservationLayout) -> str:
 
 def default_observation() -> str:
     """The observation of an environment that was made without arguments."""
-    return _layout_table(Go1Env().layout)
+    return _layout_table(EnvConfig().layout)
 
 
 def paper_observation() -> str:
     """The observation of arXiv 2505.08574: 34 numbers and the task id."""
-    return _layout_table(ObservationLayout(Go1Env().tasks))
+    return _layout_table(ObservationLayout(EnvConfig().tasks))
 
 
 def optional_parts() -> str:
@@ -170,14 +179,16 @@ def rewards() -> str:
 
 def arguments() -> str:
     """Every keyword argument of the environment, with its default."""
-    meaning = described(Go1Env)
-    physics_names = {each.name for each in fields(PhysicsParams)}
-    rows = [
-        (f"`{name}`", f"`{default!r}`", meaning.get(name, ""))
-        for name, default in defaults(Go1Env).items()
-        if name not in physics_names
-    ]
+    meaning = described(EnvConfig)
+    defaults = {each.name: each.default for each in fields(EnvConfig) if each.name != "physics"}
+    rows = [(f"`{name}`", f"`{default!r}`", meaning[name]) for name, default in defaults.items()]
     return markdown(("argument", "default", "meaning"), rows)
+
+
+def job_options() -> str:
+    """Options of the main job on the command line."""
+    actions = [action for action in job_parser()._actions if action.dest != "help"]
+    return markdown(("option", "meaning"), [(f"`{action.option_strings[0]}`", action.help) for action in actions])
 
 
 def presets() -> str:
@@ -195,13 +206,6 @@ def _setting(config: JobConfig, name: str) -> str:
     return (
         ", ".join(f"{each:g}" if isinstance(each, float) else str(each) for each in values if each is not None) or "-"
     )
-
-
-def defaults(owner: type) -> dict[str, Any]:
-    """Defaults of what a class is called with, by name."""
-    parameters = inspect.signature(owner).parameters.values()
-    named = [each for each in parameters if each.kind not in (each.VAR_POSITIONAL, each.VAR_KEYWORD)]
-    return {each.name: each.default for each in named if each.default not in (inspect.Parameter.empty, MISSING)}
 
 
 def described(owner: type) -> dict[str, str]:
@@ -229,6 +233,7 @@ TABLES: dict[str, Callable[[], str]] = {
         rewards,
         arguments,
         presets,
+        job_options,
     )
 }
 """The tables that a page can ask for."""
