@@ -124,6 +124,8 @@ def one_of(value: object, allowed: Sequence[str], what: str) -> str:
 def switch(value: object, kind: type, what: str) -> Any:
     """Return parameters that can be switched on: True gives the defaults of their kind; None and False give None.
 
+    A mapping gives the kind's fields by name, as a file of JSON holds them.
+
     Raises:
         InvalidInputError: if it is something else.
     """
@@ -131,6 +133,10 @@ def switch(value: object, kind: type, what: str) -> Any:
         return None
     if value is True:
         return kind()
+    if isinstance(value, Mapping):
+        for name in value:
+            one_of(name, tuple(each.name for each in fields(kind)), f"field of {what}")
+        return kind(**value)
     if not isinstance(value, kind):
         article = "an" if kind.__name__[0] in "AEIOU" else "a"
         raise InvalidInputError(f"{what} must be None, True, False or {article} {kind.__name__}, got {value!r}")
