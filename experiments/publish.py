@@ -72,7 +72,7 @@ PAGES = {
         "mean something on another machine.",
     ),
 }
-"""Name of the file -> page; ``main_job.md`` and ``gaits.md`` are beside them."""
+"""Name of the file -> page; ``main_job.md`` is beside them."""
 
 
 def page(name: str, folder: Path) -> str | None:
@@ -126,13 +126,6 @@ def main_job_page(results: Results) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def index(names: list[str]) -> str:
-    """The text of ``docs/results/README.md``."""
-    titles = {name: each.title for name, each in PAGES.items()} | {main_job.NAME: "The main job", "gaits": "Gaits"}
-    links = "\n".join(f"- [{titles[name]}]({name}.md)" for name in names)
-    return f"# Results\n\n{GENERATED}\n\n{links}\n"
-
-
 def summarized(text: str, table: str) -> str:
     """A text with a table between the markers of the summary.
 
@@ -151,16 +144,13 @@ def texts(root: Path) -> dict[Path, str]:
     folder, readme = root / "docs" / "results", root / "README.md"
     if not readme.is_file():
         raise InvalidInputError(f"there is no {readme}")
-    found = {"gaits": f"# Gaits\n\n{GENERATED}\n\n{main_job.gaits_table()}\n"}
-    files = {}
+    files = {folder / f"{name}.md": text for name in PAGES if (text := page(name, folder)) is not None}
     path = folder / f"{main_job.NAME}.json"
     if path.is_file():
         results = Results.read(path)
-        found[main_job.NAME] = main_job_page(results)
+        files[path.with_suffix(".md")] = main_job_page(results)
         files[readme] = summarized(readme.read_text(encoding="utf-8"), main_job.summary_table(results))
-    found |= {name: text for name in PAGES if (text := page(name, folder)) is not None}
-    files |= {folder / f"{name}.md": text for name, text in found.items()}
-    return files | {folder / "README.md": index(list(found))}
+    return files
 
 
 # -- A run of the main job ---------------------------------------------------------------------------------------------

@@ -49,11 +49,9 @@ class TrainingBenchmark(Study):
     alone = True
 
     def agents(self) -> list[Agent]:
-        """All of them together: they take turns."""
         return [Agent("all")]
 
     def cells(self, agent: Agent) -> list[Cell]:
-        """The sections."""
         return [Cell(name) for name in self.options.sections]
 
     def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:

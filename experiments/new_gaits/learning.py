@@ -136,10 +136,7 @@ class GaitTraining:
         return self._headed(rows, tuning, rehearsal(self.base, self.options, self.folder))
 
     def _headed(
-        self,
-        rows: trainers.Demonstrations,
-        bc: trainers.BCConfig,
-        rehearsed: trainers.Demonstrations | None = None,
+        self, rows: trainers.Demonstrations, bc: trainers.BCConfig, rehearsed: trainers.Demonstrations | None = None
     ) -> trainers.MultiHeadPolicy:
         """The trained policy with a head that began as the closest of its own and has learned."""
         policy = self.base.add_task(self.gait, self.seed, like=trainers.closest_task(self.base, rows))

@@ -209,11 +209,6 @@ def test_a_verdict_needs_every_metric():
     assert [*KINDS] == sorted(KINDS, key=lambda kind: [*KINDS].index(kind))
 
 
-def test_stances_are_runs_of_contact():
-    assert paper.stances(np.array([1, 1, 0, 0, 1, 0, 1], bool)) == [(0, 2), (4, 1), (6, 1)]
-    assert paper.stances(np.zeros(3, bool)) == []
-
-
 # -- New gaits ---------------------------------------------------------------------------------------------------------
 
 TINY_GAITS = dataclasses.replace(

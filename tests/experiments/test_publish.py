@@ -8,12 +8,11 @@ import pytest
 from experiments import publish
 from experiments.__main__ import main, without_folders
 from experiments.catalog import STUDIES, study_class
-from experiments.main_job import presets_table, results_of, summary_table
+from experiments.main_job import results_of, summary_table
 from experiments.publish import copy_run, publish_command, summarized, without_out
 from experiments.results import Results
-from go1_mtl_gym import TASKS, InvalidInputError
+from go1_mtl_gym import InvalidInputError
 from tests.experiments.published import FOLDER
-from trainers.pipeline.presets import PRESETS
 
 README = "# A title\n\n<!-- results:summary -->\nold\n<!-- /results:summary -->\n\nThe end.\n"
 
@@ -67,8 +66,8 @@ def test_a_run_becomes_records_a_page_and_the_summary(run, root):
     publish_command([], root)
     publish_command(["--check"], root)
     assert before == {path: path.stat().st_mtime_ns for path in root.rglob("*") if path.is_file()}
-    (root / "docs" / "results" / "gaits.md").write_text("typed by hand")
-    with pytest.raises(InvalidInputError, match="out of date: docs/results/gaits.md"):
+    (root / "docs" / "results" / "main_job.md").write_text("typed by hand")
+    with pytest.raises(InvalidInputError, match="out of date: docs/results/main_job.md"):
         publish_command(["--check"], root)
 
 
@@ -117,12 +116,6 @@ def test_every_study_has_its_results_and_its_pictures():
         study = cls(cls.full)
         assert study.table(Results.read(path)).count("\n") >= 2
         assert (study.figure(Results.read(path)) is None) == (not cls.caption)
-
-
-def test_presets_and_gaits_come_from_the_code():
-    assert all(f"`{name}`" in presets_table() for name in PRESETS)
-    gaits = (FOLDER / "gaits.md").read_text(encoding="utf-8")
-    assert all(f"| {name} |" in gaits for name in TASKS)
 
 
 # -- The command line --------------------------------------------------------------------------------------------------
