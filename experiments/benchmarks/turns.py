@@ -15,7 +15,7 @@ from experiments.stats import spread
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import number_in
 from trainers.algorithms.optimizer import torch_threads
-from trainers.pipeline.new_policy import check_device
+from  import check_device
 
 N_TASKS = 4
 """Of the made-up demonstrations, unless the number of heads is what varies."""

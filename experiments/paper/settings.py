@@ -17,7 +17,7 @@ from go1_mtl_gym.validation import finite_vector, number_in, one_of
 from trainers import BCConfig
 from trainers.data.collection import EPISODE_S
 from trainers.data.environments import derive_seed
-from trainers.pipeline.new_policy import check_device
+from  import check_device
 
 Command = tuple[float, float, float]
 """(vx [m/s], vy [m/s], yaw rate [rad/s])."""
