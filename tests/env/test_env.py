@@ -98,6 +98,18 @@ def test_an_episode_starts_standing_at_phase_zero():
     assert env.state.rpy.tolist() == [0, 0, 0] and not info["filtered_command"].any()
 
 
+@pytest.mark.parametrize("command", [(0.0, 0.0, 0.0), None], ids=["stand", "drawn"])
+@pytest.mark.parametrize("task", TASKS)
+def test_zero_action_stands_for_ten_seconds(task, command):
+    env = Go1Env(task)
+    env.reset(seed=0, options={"command": command})
+    for _ in range(500):
+        *_, terminated, truncated, info = env.step(np.zeros(12))
+        assert not terminated and not truncated
+    assert info["contacts"].all() and np.linalg.norm(env.state.position_w[:2]) < 0.05
+    assert env.state.position_w[2] == pytest.approx(robot.STANDING_HEIGHT, abs=0.03)
+
+
 def test_set_task_begins_the_gait_and_keeps_the_command():
     env = Go1Env("trot")
     env.reset(seed=0, options={"command": (0.3, 0.0, 0.1)})
