@@ -13,7 +13,7 @@ import numpy as np
 import go1_mtl_gym
 from go1_mtl_gym.contract import PolicyContract
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
-from go1_mtl_gym.validation import interval_s, number_in
+from go1_mtl_gym.validation import interval_s, number_in, one_of
 from trainers.utils.processes import keep_interrupts
 
 EnvFactory = Callable[..., gymnasium.Env]
@@ -75,7 +75,12 @@ def make_env(task: str | None, perturbation: PerturbationConfig | None = None, *
         task: name of a task; None for the multi-gait environment.
         perturbation: disturbances of the executed action, or None.
         env_kwargs: of `go1_mtl_gym.Go1Env`.
+
+    Raises:
+        InvalidInputError: if the task is not registered, or an argument is not as described.
     """
+    if task is not None:
+        one_of(task, tuple(go1_mtl_gym.TASKS), "task")
     env = gymnasium.make(go1_mtl_gym.env_id(task), disable_env_checker=True, **env_kwargs)
     if perturbation is not None:
         env = go1_mtl_gym.PerturbationWrapper(env, **dataclasses.asdict(perturbation))

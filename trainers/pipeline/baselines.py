@@ -44,7 +44,7 @@ def _train_baseline(config: JobConfig, name: str, folder: Path, progress: bool) 
     torch.set_num_threads(config.threads)
     rows = Demonstrations.load(folder / "all_rows.npz")
     if name == "paper_literal":
-        rows, policy = rows.proprioceptive(), new_policy(config, config.literal_env_kwargs)
+        rows, policy = rows.select(), new_policy(config, config.literal_env_kwargs)
     else:
         policy = new_policy(config, config.env_kwargs, pooled=True)
     train_bc(policy, rows, config.baseline_bc, progress=progress)

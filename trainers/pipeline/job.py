@@ -211,7 +211,7 @@ class Job:
         for name, policy in policies.items():
             if name == "phase_free":  # these rows hold one frame, it needs several
                 continue
-            rows = held_out.proprioceptive() if name == "paper_literal" else held_out
+            rows = held_out.select() if name == "paper_literal" else held_out
             for task, scores in offline_metrics(policy, rows).items():
                 tasks[task][name] = scores
         return tasks
