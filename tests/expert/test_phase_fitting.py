@@ -181,3 +181,12 @@ def test_scales_matter(model):
     coarse = [apart(fit_phase(state, model, only).phase, state.phase) for state in states]
     fine = [apart(fit_phase(state, model).phase, state.phase) for state in states]
     assert np.mean(fine) < np.mean(coarse) < 0.2
+
+
+def test_the_old_module_still_answers_and_says_where_to_go():
+    with pytest.warns(DeprecationWarning, match=r"experts\.phase_fitting\.fit_phase") as warned:
+        from experts.phase import fit_phase as by_its_old_name
+    assert by_its_old_name is fit_phase
+    assert {warning.filename for warning in warned} == {__file__}, "the line that should change"
+    with pytest.raises(ImportError, match="nothing"):
+        from experts.phase import nothing  # noqa: F401
