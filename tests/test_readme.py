@@ -10,7 +10,6 @@ import pytest
 from experts import MPCConfig
 from go1_mtl_gym import clock, episode, robot, termination
 from go1_mtl_gym import env as environment
-from trainers import MultiHeadPolicy, make_env
 from trainers.evaluation import scoring
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -35,31 +34,6 @@ def test_snippets_run(code, tmp_path, monkeypatch, capsys, passing_tasks):
     assert capsys.readouterr().out or "print(" not in code
 
 
-def test_the_quickstart_is_the_example_and_about_ten_lines():
-    code = (ROOT / "examples" / "quickstart.py").read_text(encoding="utf-8")
-    assert code in blocks("python")
-    assert len([line for line in code.splitlines() if line.strip()]) <= 12
-
-
-def test_the_quickstart_drives_a_policy(tmp_path, monkeypatch, capsys):
-    kwargs = {"channels": ("command", "phase"), "control_hz": 100}
-    env = make_env("trot", **kwargs)
-    policy = MultiHeadPolicy(env.observation_space, env.action_space, width=8, env_kwargs=kwargs, seed=0)
-    policy.fit_normalization(*standing_rows(env))
-    policy.save(tmp_path / "policy.zip")
-    monkeypatch.setattr(sys, "argv", ["quickstart.py", str(tmp_path / "policy.zip")])
-    exec((ROOT / "examples" / "quickstart.py").read_text(encoding="utf-8"), {"__name__": "__main__"})
-    assert capsys.readouterr().out.startswith("trot, fallen: False"), "it was told to stand"
-
-
-def standing_rows(env) -> tuple[np.ndarray, np.ndarray]:
-    """Observations and actions around a stand; an untrained policy answers with the mean action."""
-    obs, _ = env.reset(seed=0)
-    home = env.unwrapped.action_map.from_radians(robot.HOME_POSE)
-    spread = np.random.default_rng(0).normal(scale=1e-3, size=(8, 12))
-    return np.tile(obs, (8, 1)), home + spread - spread.mean(axis=0)
-
-
 def test_links_lead_somewhere():
     published = (ROOT / "docs" / "results" / "metrics.json").is_file()
     targets = set(re.findall(r"\]\(([^)#:]+)\)", README))
@@ -82,9 +56,8 @@ def test_make_targets_exist():
     assert not [target for target in targets if not re.search(rf"^{target}[: ]", makefile, re.MULTILINE)]
 
 
-def test_named_options_exist(monkeypatch):
-    monkeypatch.syspath_prepend(ROOT / "examples")
-    source = (ROOT / "examples" / "main_job" / "config.py").read_text(encoding="utf-8")
+def test_named_options_exist():
+    source = (ROOT / "trainers" / "pipeline" / "command_line.py").read_text(encoding="utf-8")
     options = re.search(r"Options: `(.*?)`", PROSE)[1].split()
     assert "--preset" in options
     assert sorted(options) == sorted(re.findall(r'"(--[a-z-]+)"', source))
