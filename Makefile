@@ -1,6 +1,7 @@
 # make dagger       installs into .venv, then runs the main job      make dagger ARGS="--preset smoke"
 # make test         installs into .venv, then lints and tests        make test PYTEST_ARGS="tests/env -x"
 # make test-newest  the same tests on the newest gymnasium and stable-baselines3, in .venv-newest
+# make docs         builds the documentation into docs/_build         open docs/_build/index.html
 # make clean        removes both environments and everything built
 #
 # Another interpreter: make test PYTHON=python3.12 (after make clean).
@@ -20,7 +21,7 @@ test test-newest: export OMP_NUM_THREADS = 1
 test test-newest: export OPENBLAS_NUM_THREADS = 1
 test test-newest: export MKL_NUM_THREADS = 1
 
-.PHONY: dagger test test-newest clean
+.PHONY: dagger test test-newest docs clean
 
 dagger: .venv/.installed
 	.venv/bin/python examples/dagger.py $(ARGS)
@@ -32,6 +33,9 @@ test: .venv/.installed-test
 test-newest: .venv-newest/.installed-test
 	.venv-newest/bin/python -m pytest $(PYTEST_ARGS)
 
+docs: .venv/.installed-docs
+	.venv/bin/python -m sphinx -E -W --keep-going -q -b html docs docs/_build
+
 .venv/.installed: $(SOURCES)
 	$(PYTHON) -m venv .venv
 	.venv/$(PIP) $(TESTED) -e .
@@ -42,6 +46,11 @@ test-newest: .venv-newest/.installed-test
 	.venv/$(PIP) $(TESTED) -e ".[test]"
 	touch .venv/.installed $@
 
+# The site imports the packages: it is built where the tests run, so that nothing large is installed twice.
+.venv/.installed-docs: .venv/.installed-test constraints/docs.txt
+	.venv/$(PIP) $(TESTED) -c constraints/docs.txt -e ".[docs]"
+	touch $@
+
 # imitation pins older versions of both; the code runs on the newest all the same, so they go on top without its consent.
 .venv-newest/.installed-test: $(SOURCES) constraints/newest.txt
 	$(PYTHON) -m venv .venv-newest
@@ -50,5 +59,5 @@ test-newest: .venv-newest/.installed-test
 	touch $@
 
 clean:
-	rm -rf .venv .venv-newest build dist *.egg-info .pytest_cache .ruff_cache
+	rm -rf .venv .venv-newest docs/_build build dist *.egg-info .pytest_cache .ruff_cache
 	find go1_mtl_gym experts trainers examples benchmarks tests -name __pycache__ -prune -exec rm -rf {} +

@@ -7,16 +7,21 @@ Importing the package registers ``Go1Trot-v0``, ``Go1Bound-v0``, ``Go1Jump-v0``,
 
 from importlib.metadata import PackageNotFoundError, version
 
+from go1_mtl_gym import _moved
+from go1_mtl_gym.actuation import PDGains
 from go1_mtl_gym.contract import PolicyContract
 from go1_mtl_gym.env import Go1Env
+from go1_mtl_gym.env_config import EnvConfig
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
 from go1_mtl_gym.gaits import GAITS, Gait
 from go1_mtl_gym.registration import env_id, register_built_in, register_task
+from go1_mtl_gym.rewards import RewardWeights
 from go1_mtl_gym.sensing.observation import ObservationLayout, SensorNoise
 from go1_mtl_gym.sensing.state import RobotState
 from go1_mtl_gym.sensing.state_estimator import StateEstimatorConfig
 from go1_mtl_gym.sensing.state_noise import EstimatorNoise
 from go1_mtl_gym.sim.domain_randomization import DomainRandomization
+from go1_mtl_gym.sim.physics_params import PhysicsParams
 from go1_mtl_gym.tasks import PAPER_TASKS, TASKS, Task
 from go1_mtl_gym.wrappers import PerturbationWrapper
 
@@ -25,14 +30,18 @@ __all__ = [
     "PAPER_TASKS",
     "TASKS",
     "DomainRandomization",
+    "EnvConfig",
     "EstimatorNoise",
     "Gait",
     "Go1Env",
     "Go1Error",
     "InvalidInputError",
     "ObservationLayout",
+    "PDGains",
     "PerturbationWrapper",
+    "PhysicsParams",
     "PolicyContract",
+    "RewardWeights",
     "RobotState",
     "SensorNoise",
     "StateEstimatorConfig",
@@ -46,4 +55,5 @@ try:
 except PackageNotFoundError:  # a source tree that was not installed
     __version__ = "0+unknown"
 
+_moved.install()
 register_built_in()

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from go1_mtl_gym import robot
-from go1_mtl_gym.validation import number_in
+from go1_mtl_gym.validation import Limits, check_numbers
 
 PHYSICS_HZ = 1000
 """Rate of the physics, and with it of the actuators [Hz]."""
+_ALLOWED = {"kp": Limits(5.0, 500.0, " [N m/rad]"), "kd": Limits(0.0, 20.0, " [N m s/rad]")}
 
 
 @dataclass(frozen=True)
@@ -27,8 +28,8 @@ class PDGains:
     kd: float = 2.0
 
     def __post_init__(self) -> None:
-        number_in(self.kp, 5.0, 500.0, "kp [N m/rad]")
-        number_in(self.kd, 0.0, 20.0, "kd [N m s/rad]")
+        """Check the numbers."""
+        check_numbers(self, _ALLOWED)
 
     def torque(self, target: np.ndarray, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Torque before the limits [N m], shape (12,): tau = kp (a - q) - kd v."""
@@ -47,12 +48,19 @@ class ActionMap:
     limits at every joint position and speed within theirs.
 
     Attributes:
-        center: shape (12,) [rad].
-        half_range: shape (12,) [rad].
+        center: shape (12,) [rad], read-only.
+        half_range: shape (12,) [rad], read-only.
     """
 
     center: np.ndarray
     half_range: np.ndarray
+
+    def __post_init__(self) -> None:
+        """Keep read-only copies."""
+        for name in ("center", "half_range"):
+            values = np.array(getattr(self, name), dtype=np.float64)
+            values.flags.writeable = False
+            object.__setattr__(self, name, values)
 
     @classmethod
     def for_gains(cls, gains: PDGains) -> "ActionMap":

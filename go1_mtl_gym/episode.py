@@ -1,23 +1,71 @@
-"""What an episode carries from step to step, apart from the physics."""
+"""One episode: how its conditions are drawn, what it carries from step to step, and when it is over."""
 
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from go1_mtl_gym.clock import next_phase, passes
+from go1_mtl_gym.env_config import EnvConfig
+from go1_mtl_gym.gaits import next_phase, passes
 from go1_mtl_gym.rewards import reward_terms
 from go1_mtl_gym.sensing.observation import SensorNoise
 from go1_mtl_gym.sensing.state import RobotState
 from go1_mtl_gym.sensing.state_estimator import StateEstimator
 from go1_mtl_gym.sensing.state_noise import EstimatorError
+from go1_mtl_gym.sensing.state_source import StateSource, TrueState
+from go1_mtl_gym.sim.physics_params import PhysicsParams
 from go1_mtl_gym.tasks import Task
 
 COMMAND_FILTER_S = 0.2
 """Time constant of the low-pass between a command and what expert and student see of it [s]."""
 COMMAND_SLEW = (4.0, 4.0, 8.0)
 """Largest change of the filtered command per second: vx, vy [m/s^2], yaw rate [rad/s^2]."""
+FALLEN_HEIGHT = 0.14
+"""A trunk lower than this has fallen [m]."""
+FALLEN_COSINE = 0.5
+"""A trunk tilted by more than arccos of this has fallen."""
+
+
+# -- Its conditions ----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class EpisodeConditions:
+    """What one episode takes place under.
+
+    Attributes:
+        physics: what is different about the physics; None leaves the simulation as it is.
+        sensor_noise: of the sensors, or None.
+        state_source: where the expert's state comes from.
+    """
+
+    physics: PhysicsParams | None
+    sensor_noise: SensorNoise | None
+    state_source: StateSource
+
+
+def draw_conditions(config: EnvConfig, rng: np.random.Generator) -> EpisodeConditions:
+    """Draw what the next episode takes place under.
+
+    Args:
+        config: the environment's.
+        rng: gives one number for the estimator noise and one for the randomization, whatever is drawn from them.
+    """
+    source: StateSource = TrueState()
+    if config.estimator_noise is not None:
+        source = EstimatorError(config.estimator_noise, int(rng.integers(2**63)))
+    if config.state_estimator is not None:
+        source = StateEstimator(config.state_estimator)
+    if config.randomization is None:
+        return EpisodeConditions(None, config.noise, source)
+    stream = np.random.default_rng(int(rng.integers(2**63)))
+    physics, factor = config.randomization.draw(stream, config.physics)
+    return EpisodeConditions(physics, config.noise if factor is None else config.scaled_noise(factor), source)
+
+
+# -- Its course --------------------------------------------------------------------------------------------------------
 
 
 def filtered(command: np.ndarray, before: np.ndarray, seconds: float) -> np.ndarray:
@@ -31,61 +79,90 @@ def filtered(command: np.ndarray, before: np.ndarray, seconds: float) -> np.ndar
         seconds: t [s].
     """
     limit = np.array(COMMAND_SLEW) * seconds
-    share = 1.0 - np.exp(-seconds / COMMAND_FILTER_S)
-    return before + np.clip(share * (command - before), -limit, limit)
+    fraction = 1.0 - np.exp(-seconds / COMMAND_FILTER_S)
+    return before + np.clip(fraction * (command - before), -limit, limit)
 
 
 @dataclass
 class Episode:
-    """Task, command, gait clock and memory of the observation.
+    """Task, command, gait clock and memory. Others read it; it is changed by its methods alone.
 
     Attributes:
         task: what is asked for.
         command: (vx [m/s], vy [m/s], yaw rate [rad/s]) as asked for, shape (3,).
         last_action: the action applied during the last step, in [-1, 1], shape (12,).
-        older_frames: the proprioceptive frames before the present one, newest first; its `maxlen` is their number.
+        frames: the latest proprioceptive frames, newest first, each of shape (34,); its `maxlen` is their number.
+        sensor_noise: what is added to the sensors' readings, or None.
+        state_source: where the expert's state comes from.
         filtered_command: what expert and student see of the command, shape (3,).
         phase: the gait clock [cycles], in [0, 1).
         steps: control periods since the reset.
         time_s: since the reset [s].
         next_task: what will be asked for as soon as the present gait can be left, or None.
-        sensor_noise: what is added to the sensors' readings, or None.
-        estimator_error: what the expert's state estimator gets wrong, or None.
-        state_estimator: the expert's, fed by the observation, or None; without either the expert sees the true state.
     """
 
     task: Task
     command: np.ndarray
     last_action: np.ndarray
-    older_frames: deque[np.ndarray]
+    frames: deque[np.ndarray]
+    sensor_noise: SensorNoise | None = None
+    state_source: StateSource = field(default_factory=TrueState)
     filtered_command: np.ndarray = field(default_factory=lambda: np.zeros(3))
     phase: float = 0.0
     steps: int = 0
     time_s: float = 0.0
     next_task: Task | None = None
-    sensor_noise: SensorNoise | None = None
-    estimator_error: EstimatorError | None = None
-    state_estimator: StateEstimator | None = None
 
     @property
     def requested_task(self) -> Task:
         """What was asked for last: the present task, or the one that waits until the present gait can be left."""
         return self.next_task or self.task
 
-    def advance(self, control_s: float) -> None:
-        """Let one control period [s] pass: clock and command filter move on.
+    @property
+    def older_frames(self) -> list[np.ndarray]:
+        """The frames before the newest one, newest first."""
+        return list(self.frames)[1:]
+
+    def advance(self, action: np.ndarray, control_s: float) -> None:
+        """Let a control period pass: clock and command filter move on.
 
         The clock obeys the filtered command that expert and student saw at the beginning of the period.
+
+        Args:
+            action: that was applied meanwhile, in [-1, 1], shape (12,).
+            control_s: the period [s].
         """
         before, mark = self.phase, self.task.gait.change_phase
         self.phase = next_phase(self.task.gait, before, self.filtered_command, control_s)
         if self.next_task is not None and (mark is None or before == self.phase or passes(mark, before, self.phase)):
             self.change_task(self.next_task, 0.0)
         self.filtered_command = filtered(self.command, self.filtered_command, control_s)
+        self.last_action = action
         self.steps += 1
         self.time_s = self.steps * control_s
-        if self.estimator_error is not None:
-            self.estimator_error.advance()
+
+    def remember(self, frame: np.ndarray) -> None:
+        """Take in the newest frame, shape (34,); the first one of an episode also stands for those before it."""
+        missing = (self.frames.maxlen or 0) - len(self.frames)
+        self.frames.extend([frame] * missing)
+        self.frames.appendleft(frame)
+
+    def inform(self, state: RobotState, readings: Mapping[str, np.ndarray], control_s: float) -> None:
+        """Tell the state's source what a reset or step has led to.
+
+        Args:
+            state: the true one.
+            readings: the proprioceptive parts of the observation by name.
+            control_s: the control period [s].
+        """
+        if self.steps == 0:
+            self.state_source.begin(state, readings)
+        else:
+            self.state_source.advance(readings, control_s)
+
+    def change_command(self, command: np.ndarray) -> None:
+        """Ask for another (vx [m/s], vy [m/s], yaw rate [rad/s]), shape (3,)."""
+        self.command = command
 
     def change_task(self, task: Task, phase: float | None) -> None:
         """Change the task: at once to a phase, or with None to phase 0 as soon as the present gait can be left.
@@ -97,10 +174,7 @@ class Episode:
         else:
             self.next_task = None if task == self.task else task
 
-    def estimated(self, state: RobotState) -> RobotState:
-        """What the state estimator makes of the true state, now."""
-        estimator = self.state_estimator or self.estimator_error
-        return state if estimator is None else estimator.estimate(state)
+    # -- Its reports ---------------------------------------------------------------------------------------------------
 
     def rewards(self, state: RobotState, torque: np.ndarray, ended: str) -> dict[str, float]:
         """The reward terms of the step that led to a state.
@@ -115,7 +189,7 @@ class Episode:
         return dict.fromkeys(terms, 0.0) if ended == "unstable" else terms
 
     def info(self, state: RobotState, terms: dict[str, float], ended: str) -> dict[str, Any]:
-        """What `reset` and `step` report.
+        """What `reset` and `step` report; nothing in it is shared with the episode.
 
         Args:
             state: the true one, now.
@@ -127,10 +201,28 @@ class Episode:
             "command": self.command.copy(),
             "filtered_command": self.filtered_command.copy(),
             "base_velocity": np.nan_to_num(state.base_velocity),
-            "contacts": state.contacts,
+            "contacts": state.contacts.copy(),
             "phase": self.phase,
             "standing": state.standing,
             "reward_terms": terms,
             "fallen": ended in ("fall", "unstable"),
             "ended": ended,
         }
+
+
+# -- Its end -----------------------------------------------------------------------------------------------------------
+
+
+def how_it_ended(state: RobotState, stable: bool, time_is_up: bool) -> str:
+    """Why an episode is over: "unstable", "fall" or "time"; "" while it goes on.
+
+    Args:
+        state: the robot now.
+        stable: False once the physics has diverged.
+        time_is_up: whether the episode has had its length.
+    """
+    if not stable:
+        return "unstable"
+    if state.position_w[2] < FALLEN_HEIGHT or -state.gravity_b[2] < FALLEN_COSINE:
+        return "fall"
+    return "time" if time_is_up else ""

@@ -1,4 +1,4 @@
-"""Gaits as data: when each foot is on the ground, where it stands, and how high it swings."""
+"""Gaits as data, and the gait clock: when each foot is on the ground, where it stands, how high it swings."""
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -8,7 +8,17 @@ import numpy as np
 
 from go1_mtl_gym import robot
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.validation import finite_vector, number_in
+from go1_mtl_gym.validation import Limits, check_numbers, finite_vector, number_in
+
+STAND_COMMAND = (0.02, 0.02, 0.04)
+"""A command with smaller |vx|, |vy| [m/s] and |yaw rate| [rad/s] asks for a stand."""
+_ALLOWED = {
+    "period": Limits(0.15, 3.0, " [s]"),
+    "duty": Limits(0.2, 0.95),
+    "swing_height": Limits(0.01, 0.2, " [m]"),
+    "stance_width": Limits(0.3, 1.5),
+}
+_SLACK = 1e-9  # of the clock [cycles]; adding up fractions of a cycle ends a little below the whole
 
 
 @dataclass(frozen=True)
@@ -38,12 +48,10 @@ class Gait:
     stance_width: float = 1.0
 
     def __post_init__(self) -> None:
-        if not self.name:
-            raise InvalidInputError("a gait needs a name, got an empty string")
-        number_in(self.period, 0.15, 3.0, f"period [s] of gait {self.name!r}")
-        number_in(self.duty, 0.2, 0.95, f"duty of gait {self.name!r}")
-        number_in(self.swing_height, 0.01, 0.2, f"swing_height [m] of gait {self.name!r}")
-        number_in(self.stance_width, 0.3, 1.5, f"stance_width of gait {self.name!r}")
+        """Check the numbers, and make them Python's."""
+        if not isinstance(self.name, str) or not self.name:
+            raise InvalidInputError(f"a gait needs a name, got {self.name!r}")
+        check_numbers(self, _ALLOWED, suffix=f" of gait {self.name!r}")
         offsets = finite_vector(self.offsets, 4, f"offsets of gait {self.name!r}")
         object.__setattr__(self, "offsets", tuple(offsets.tolist()))  # a gait can be hashed and compared
 
@@ -135,3 +143,45 @@ GAITS = MappingProxyType(
     }
 )
 """The built-in gaits by name."""
+
+
+# -- The clock ---------------------------------------------------------------------------------------------------------
+
+
+def asks_to_stand(gait: Gait, command: np.ndarray) -> bool:
+    """Whether the gait can stand and the filtered command, shape (3,), is about zero."""
+    return bool((np.abs(command) < STAND_COMMAND).all()) and gait.can_stand
+
+
+def is_standing(gait: Gait, phase: float, command: np.ndarray) -> bool:
+    """Whether the clock rests: at phase 0 of a gait that can stand there, under a command that asks for it."""
+    return phase == 0.0 and asks_to_stand(gait, command)
+
+
+def next_phase(gait: Gait, phase: float, command: np.ndarray, seconds: float) -> float:
+    """The clock [cycles], in [0, 1), after some time under one filtered command.
+
+    It gains seconds / period. A command that asks for a stand lets it run on to the next phase 0, where it rests at
+    exactly 0.0.
+    """
+    turns = phase + seconds / gait.period
+    if asks_to_stand(gait, command) and (phase == 0.0 or turns >= 1.0 - _SLACK):
+        return 0.0
+    return turns % 1.0
+
+
+def passes(mark: float, before: float, after: float) -> bool:
+    """Whether the clock came to, or past, a phase between two readings less than a cycle apart; all in [0, 1)."""
+    return (mark - before) % 1.0 <= (after - before) % 1.0
+
+
+def check_phase(phase: object) -> float:
+    """Return a phase of the gait clock [cycles].
+
+    Raises:
+        InvalidInputError: if it is no number in [0, 1).
+    """
+    number = number_in(phase, 0.0, 1.0, "phase [cycles]")
+    if number == 1.0:
+        raise InvalidInputError("phase [cycles] must lie in [0, 1), got 1")
+    return number

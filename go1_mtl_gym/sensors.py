@@ -1,83 +1,75 @@
-"""What experts and students see: the true state, and the observation with its noise and memory."""
+"""What there is to see at one instant: the true state, and what the sensors say. Pure: nothing here remembers."""
+
+from collections.abc import Mapping
 
 import numpy as np
 
-from go1_mtl_gym.episode import Episode
-from go1_mtl_gym.sensing.observation import PROPRIOCEPTION, ObservationLayout
+from go1_mtl_gym.gaits import Gait
+from go1_mtl_gym.sensing.observation import PROPRIOCEPTION, SensorNoise
 from go1_mtl_gym.sensing.state import RobotState
 from go1_mtl_gym.sim.simulation import Simulation
 
 
-class Observer:
-    """Makes states and observations.
+def robot_state(simulation: Simulation, gait: Gait, phase: float, command: np.ndarray, time_s: float) -> RobotState:
+    """The true state, now; nothing in it is shared with the simulation or the caller.
 
     Args:
-        layout: which parts there are.
-        tasks: names in the order of the task id.
-        control_s: time between two observations [s].
+        simulation: of the robot.
+        gait: that is asked for.
+        phase: of the gait clock [cycles].
+        command: filtered (vx [m/s], vy [m/s], yaw rate [rad/s]), shape (3,).
+        time_s: since the reset [s].
     """
+    data = simulation.data
+    return RobotState(
+        position_w=data.qpos[:3].copy(),
+        quat_wxyz=data.qpos[3:7].copy(),
+        linear_velocity_w=data.qvel[:3].copy(),
+        angular_velocity_b=data.qvel[3:6].copy(),
+        q=simulation.q,
+        v=simulation.v,
+        contacts=simulation.contacts,
+        gait=gait,
+        phase=phase,
+        command=command.copy(),
+        time_s=time_s,
+    )
 
-    def __init__(self, layout: ObservationLayout, tasks: tuple[str, ...], control_s: float) -> None:
-        self._layout = layout
-        self._tasks = tasks
-        self._control_s = control_s
 
-    @staticmethod
-    def state(simulation: Simulation, episode: Episode) -> RobotState:
-        """All that an expert may read, now."""
-        data = simulation.data
-        return RobotState(
-            position_w=data.qpos[:3].copy(),
-            quat_wxyz=data.qpos[3:7].copy(),
-            linear_velocity_w=data.qvel[:3].copy(),
-            angular_velocity_b=data.qvel[3:6].copy(),
-            q=simulation.q,
-            v=simulation.v,
-            contacts=simulation.contacts,
-            gait=episode.task.gait,
-            phase=episode.phase,
-            command=episode.filtered_command,
-            time_s=episode.time_s,
-        )
+def measure(
+    simulation: Simulation,
+    state: RobotState,
+    last_action: np.ndarray,
+    noise: SensorNoise | None,
+    rng: np.random.Generator,
+) -> dict[str, np.ndarray]:
+    """Every part of an observation by name, now, whether a layout has it or not; finite even if the physics diverged.
 
-    def observe(
-        self, simulation: Simulation, state: RobotState, episode: Episode, rng: np.random.Generator
-    ) -> np.ndarray:
-        """The observation after a reset or step, float32, shape (layout.size,); call it once for each.
+    Args:
+        simulation: whose sensors are read.
+        state: of the robot, now.
+        last_action: the action applied during the last step, shape (12,).
+        noise: of the sensors, or None.
+        rng: that the noise is drawn from.
+    """
+    reading = simulation.read()
+    turn = 2 * np.pi * state.phase
+    parts = {
+        "accelerometer": reading.accelerometer,
+        "gyroscope": reading.gyroscope,
+        "q": state.q,
+        "dq": state.v,
+        "contacts": reading.contacts,
+        "command": state.command,
+        "gravity": state.gravity_b,
+        "phase": np.array([np.sin(turn), np.cos(turn)]),
+        "last_action": last_action,
+    }
+    if noise is not None:
+        noise.apply(parts, rng)
+    return parts if simulation.stable else {name: np.nan_to_num(part) for name, part in parts.items()}
 
-        Args:
-            simulation: whose sensors are read.
-            state: the robot's state now.
-            episode: has the noise of the sensors; its present frame is added to `older_frames`, and its
-                `state_estimator` is told what the student sees.
-            rng: of the noise.
-        """
-        reading = simulation.read()
-        turn = 2 * np.pi * episode.phase
-        parts = {
-            "accelerometer": reading.accelerometer,
-            "gyroscope": reading.gyroscope,
-            "q": state.q,
-            "dq": state.v,
-            "contacts": reading.contacts,
-            "command": episode.filtered_command,
-            "gravity": state.gravity_b,
-            "phase": np.array([np.sin(turn), np.cos(turn)]),
-            "last_action": episode.last_action,
-        }
-        if episode.sensor_noise is not None:
-            episode.sensor_noise.apply(parts, rng)
-        if not simulation.stable:
-            parts = {name: np.nan_to_num(part) for name, part in parts.items()}
-        frame = np.concatenate([parts[name] for name in PROPRIOCEPTION])
-        if episode.steps == 0:
-            episode.older_frames.extend([frame] * (self._layout.history - 1))
-        observation = self._layout.flatten(parts, episode.older_frames, self._tasks.index(episode.task.name))
-        episode.older_frames.appendleft(frame)
-        if episode.state_estimator is not None and simulation.stable:
-            readings = {name: observation[self._layout.slices[name]].astype(np.float64) for name in PROPRIOCEPTION}
-            if episode.steps == 0:
-                episode.state_estimator.begin(state, readings)
-            else:
-                episode.state_estimator.update(readings, self._control_s)
-        return observation
+
+def frame(parts: Mapping[str, np.ndarray]) -> np.ndarray:
+    """The proprioceptive parts of an instant in a row, shape (34,); what a history consists of."""
+    return np.concatenate([parts[name] for name in PROPRIOCEPTION])

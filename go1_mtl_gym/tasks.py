@@ -1,7 +1,7 @@
 """Tasks: a gait, the commands it is asked to follow, and what its reward weighs."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
@@ -36,6 +36,7 @@ class Task:
     reward: RewardWeights = field(default_factory=RewardWeights)
 
     def __post_init__(self) -> None:
+        """Check everything, and make tuples of what came."""
         if not isinstance(self.gait, Gait):
             raise InvalidInputError(f"gait of task {self.name!r} must be a Gait, got {self.gait!r}")
         span = finite_vector(self.command_range, 3, f"command_range of task {self.name!r}")
@@ -126,3 +127,29 @@ def check_task_names(names: object) -> tuple[str, ...]:
     if len(set(names)) != len(names):
         raise InvalidInputError(f"tasks must differ from each other, got {tuple(names)}")
     return tuple(names)
+
+
+def check_reset_options(
+    options: object, tasks: tuple[str, ...], default_task: str | None
+) -> tuple[str | None, np.ndarray | None]:
+    """Return the task's name (None: draw one) and the command (None: draw one) that an episode was asked to have.
+
+    Args:
+        options: what an environment's `reset` was given.
+        tasks: names that the environment knows.
+        default_task: the environment's own, or None.
+
+    Raises:
+        InvalidInputError: for an unknown option, task or impossible command.
+    """
+    if not (options is None or isinstance(options, Mapping)):
+        raise InvalidInputError(f'reset options must be a dictionary such as {{"task": "trot"}}, got {options!r}')
+    given = dict(options or {})
+    for name in given:
+        one_of(name, ("command", "task"), "reset option")
+    task, command = given.get("task"), given.get("command")
+    task = default_task if task is None else one_of(task, tasks, "task")
+    if command is not None:
+        for name in tasks if task is None else (task,):  # whichever is drawn must allow it
+            command = TASKS[name].check_command(command)
+    return task, command

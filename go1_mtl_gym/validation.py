@@ -1,15 +1,25 @@
 """Small checks shared by everything that takes numbers from a user."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from numbers import Real
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
 from go1_mtl_gym.errors import InvalidInputError
 
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+Parameters = TypeVar("Parameters")
+
+_NUMBER_KINDS = "iufO"
+"""Kinds of numpy arrays that hold numbers, or things that may be numbers; not booleans, text or complex numbers."""
+
 
 def finite_vector(value: object, size: int, what: str) -> np.ndarray:
-    """Return `value` as a float64 vector of shape (size,).
+    """Return `value` as a new float64 vector of shape (size,).
 
     Args:
         value: anything numpy can read as numbers.
@@ -20,9 +30,12 @@ def finite_vector(value: object, size: int, what: str) -> np.ndarray:
         InvalidInputError: if the value is not numeric, has another shape, or holds NaN or infinity.
     """
     try:
-        vector = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InvalidInputError(f"{what} must be {size} numbers, got {value!r}") from error
+        raw = np.asarray(value)
+        vector = raw.astype(np.float64) if raw.dtype.kind in _NUMBER_KINDS else None
+    except Exception as error:  # foreign arrays raise what they like; a tensor with a gradient, a RuntimeError
+        raise InvalidInputError(f"{what} must be {size} numbers, got {value!r} ({error})") from error
+    if vector is None:
+        raise InvalidInputError(f"{what} must be {size} numbers, got {value!r}")
     if vector.shape != (size,):
         raise InvalidInputError(f"{what} must have shape ({size},), got shape {vector.shape}")
     if not np.isfinite(vector).all():
@@ -48,14 +61,61 @@ def number_in(value: object, low: float, high: float, what: str) -> float:
     """Return `value` as a float in [low, high].
 
     Raises:
-        InvalidInputError: if it is not a finite number in that range.
+        InvalidInputError: if it is not a finite number in that range; True and False are no numbers.
     """
-    if not isinstance(value, Real):
+    if not isinstance(value, Real) or isinstance(value, bool):
         raise InvalidInputError(f"{what} must be a number in [{low:g}, {high:g}], got {value!r}")
     number = float(value)
     if not low <= number <= high:
         raise InvalidInputError(f"{what} must lie in [{low:g}, {high:g}], got {number:g}")
     return number
+
+
+def integer_in(value: object, low: int, high: int, what: str) -> int:
+    """Return `value` as an int in [low, high].
+
+    Raises:
+        InvalidInputError: if it is no whole number, or outside the range.
+    """
+    whole = isinstance(value, Real) and not isinstance(value, bool) and float(value).is_integer()
+    if not whole or not low <= value <= high:  # type: ignore[operator]
+        raise InvalidInputError(f"{what} must be an integer from {low} to {high}, got {value!r}")
+    return int(value)  # type: ignore[call-overload]
+
+
+class Limits(NamedTuple):
+    """What a number may be.
+
+    Attributes:
+        low, high: the smallest and the largest value.
+        unit: how messages name it, such as " [s]".
+    """
+
+    low: float
+    high: float
+    unit: str = ""
+
+
+def check_numbers(
+    parameters: "DataclassInstance", limits: Limits | Mapping[str, Limits], prefix: str = "", suffix: str = ""
+) -> None:
+    """Check numbers of a frozen dataclass, and make them floats, equal to what comes back from a file.
+
+    Args:
+        parameters: the dataclass, while it is made. A field whose default is None may be None.
+        limits: of all fields, or of some by name.
+        prefix: how the message names the dataclass, before the field's name.
+        suffix: likewise, after it.
+
+    Raises:
+        InvalidInputError: if a number is none, or outside its limits.
+    """
+    every = limits if isinstance(limits, Mapping) else {each.name: limits for each in fields(parameters)}
+    default = {each.name: each.default for each in fields(parameters)}
+    for name, (low, high, unit) in every.items():
+        value = getattr(parameters, name)
+        if value is not None or default[name] is not None:
+            object.__setattr__(parameters, name, number_in(value, low, high, f"{prefix}{name}{unit}{suffix}"))
 
 
 def one_of(value: object, allowed: Sequence[str], what: str) -> str:
@@ -64,6 +124,44 @@ def one_of(value: object, allowed: Sequence[str], what: str) -> str:
     Raises:
         InvalidInputError: otherwise.
     """
-    if value not in allowed:
+    if not isinstance(value, str) or value not in allowed:
         raise InvalidInputError(f"{what} must be one of {', '.join(map(repr, allowed))}; got {value!r}")
     return str(value)
+
+
+def switch(value: object, kind: type[Parameters], what: str) -> Parameters | None:
+    """Return parameters that can be switched on: True gives the defaults of their kind; None and False give None.
+
+    Args:
+        value: what a user gave; a dictionary holds fields, as JSON has them.
+        kind: a dataclass of parameters.
+        what: how messages name it.
+
+    Raises:
+        InvalidInputError: if it is something else.
+    """
+    if value is None or value is False:
+        return None
+    return kind() if value is True else parameters_of(value, kind, what, "None, True, False or ")
+
+
+def parameters_of(value: object, kind: type[Parameters], what: str, others: str = "") -> Parameters:
+    """Return parameters of a kind, made from a dictionary of their fields if need be.
+
+    Args:
+        value: what a user gave.
+        kind: a dataclass of parameters.
+        what: how messages name it.
+        others: what else messages say it may be.
+
+    Raises:
+        InvalidInputError: if it is something else.
+    """
+    if isinstance(value, Mapping):
+        for name in value:
+            one_of(name, tuple(each.name for each in fields(kind)), f"field of {what}")  # type: ignore[arg-type]
+        return kind(**value)
+    if not isinstance(value, kind):
+        article = "an" if kind.__name__[0] in "AEIOU" else "a"
+        raise InvalidInputError(f"{what} must be {others}{article} {kind.__name__}, got {value!r}")
+    return value

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from trainers.algorithms.dagger_collector import BlockCollector
     from trainers.algorithms.losses import MultiTaskLoss
     from trainers.algorithms.phase_free import PhaseConfig, train_phase, train_phase_free
+    from trainers.algorithms.ppo import ppo_from_policy
     from trainers.data.batches import TensorBatches
     from trainers.data.collection import CollectJob, ShardMismatchError, collect, collect_all, watch
     from trainers.data.demonstrations import Demonstrations
@@ -82,6 +83,7 @@ _HOME = {
     "offline_metrics": "evaluation.metrics",
     "paper_table": "utils.report",
     "phase_errors": "policies.phase_estimator",
+    "ppo_from_policy": "algorithms.ppo",
     "record_frames": "evaluation.video",
     "results_table": "utils.report",
     "save_gif": "evaluation.video",

@@ -10,7 +10,7 @@ from expert_report.lab import Lab, generator
 from expert_report.limits import CRUISE
 from go1_mtl_gym import TASKS, Gait, robot
 from go1_mtl_gym.actuation import PHYSICS_HZ
-from go1_mtl_gym.clock import next_phase
+from go1_mtl_gym.gaits import next_phase
 
 SATURATED = 0.999
 """A joint is at its limit from this share of it."""

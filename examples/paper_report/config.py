@@ -9,7 +9,7 @@ import numpy as np
 
 from experts import HARDWARE_LIKE
 from go1_mtl_gym import TASKS, EstimatorNoise
-from go1_mtl_gym.conditions import EXPERTS_ALONE
+from go1_mtl_gym.env_config import EXPERT_ONLY
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import finite_vector, number_in, one_of
 from trainers import BCConfig
@@ -64,7 +64,7 @@ class Table:
     @property
     def student_kwargs(self) -> dict[str, Any]:
         """Of the students' environments: what only the expert notices is left out."""
-        return {name: value for name, value in self.env_kwargs.items() if name not in EXPERTS_ALONE}
+        return {name: value for name, value in self.env_kwargs.items() if name not in EXPERT_ONLY}
 
 
 SIMULATION = Table(

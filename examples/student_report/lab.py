@@ -8,7 +8,7 @@ from typing import Any
 
 import trainers
 from go1_mtl_gym import TASKS
-from go1_mtl_gym.conditions import EXPERTS_ALONE
+from go1_mtl_gym.env_config import EXPERT_ONLY
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.sim.physics_params import PhysicsParams
 from trainers.evaluation.metrics import wilson_interval
@@ -17,7 +17,7 @@ EXPERT = "expert"
 SHARED = ("tasks", "control_hz", "kp", "kd")
 """Arguments of the students' environments that the expert's has as well; the others shape what only students see."""
 
-WORLD = ("randomization", "noise", *EXPERTS_ALONE, *(each.name for each in fields(PhysicsParams)))
+WORLD = ("randomization", "noise", *EXPERT_ONLY, *(each.name for each in fields(PhysicsParams)))
 """Arguments in which the environment that a student was trained in may differ; here all walk in the model's world."""
 
 

@@ -16,14 +16,14 @@
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import asdict, astuple, dataclass
 from types import MappingProxyType
 
 import numpy as np
 
 from go1_mtl_gym import robot
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.validation import number_in, one_of
+from go1_mtl_gym.validation import Limits, check_numbers, integer_in, one_of
 
 PROPRIOCEPTION = MappingProxyType({"accelerometer": 3, "gyroscope": 3, "q": 12, "dq": 12, "contacts": 4})
 """Sizes of the raw proprioceptive parts; together the 34 numbers of arXiv 2505.08574."""
@@ -71,8 +71,8 @@ class SensorNoise:
     gravity: float = 0.02
 
     def __post_init__(self) -> None:
-        for name in ("accelerometer", "gyroscope", "q", "dq", "gravity"):
-            number_in(getattr(self, name), 0.0, 10.0, f"sensor noise of {name}")
+        """Check the numbers."""
+        check_numbers(self, Limits(0.0, 10.0), "sensor noise of ")
 
     def scaled(self, factor: float) -> "SensorNoise":
         """The same with every standard deviation multiplied by a factor.
@@ -84,9 +84,9 @@ class SensorNoise:
 
     def apply(self, parts: dict[str, np.ndarray], rng: np.random.Generator) -> None:
         """Add noise to the readings in place, drawing in a fixed order."""
-        for name in ("accelerometer", "gyroscope", "q", "dq", "gravity"):
+        for name, deviation in asdict(self).items():
             if name in parts:
-                parts[name] = parts[name] + rng.normal(0.0, getattr(self, name), parts[name].shape)
+                parts[name] = parts[name] + rng.normal(0.0, deviation, parts[name].shape)
 
 
 class ObservationLayout:
@@ -109,16 +109,15 @@ class ObservationLayout:
     """
 
     def __init__(self, tasks: Sequence[str], channels: Sequence[str] = (), history: int = 1) -> None:
+        """Find out where everything stands."""
         if isinstance(channels, str) or not isinstance(channels, Sequence):
             raise InvalidInputError(f'channels must be a sequence of names such as ("command",), got {channels!r}')
         for name in channels:
             one_of(name, tuple(CHANNELS), "channel")
         if len(set(channels)) != len(channels):
             raise InvalidInputError(f"channels must differ from each other, got {tuple(channels)}")
-        if isinstance(history, bool) or not isinstance(history, (int, np.integer)) or not 1 <= history <= 50:
-            raise InvalidInputError(f"history must be an integer from 1 to 50, got {history!r}")
         self.channels = tuple(name for name in CHANNELS if name in channels)
-        self.history = int(history)
+        self.history = integer_in(history, 1, 50, "history")
         self.tasks = tuple(tasks)
         self.n_tasks = len(self.tasks)
         sizes = dict(PROPRIOCEPTION) | {name: CHANNELS[name] for name in self.channels}
@@ -170,6 +169,10 @@ class ObservationLayout:
             raise InvalidInputError(f"the other layout's history must be at most {self.history}, got {other.history}")
         first = {name: self.slices[name].start for name in other.slices}
         return np.concatenate([np.arange(w.stop - w.start) + first[name] for name, w in other.slices.items()])
+
+    def proprioception(self, observation: np.ndarray) -> dict[str, np.ndarray]:
+        """The proprioceptive parts of an observation by name, float64 copies."""
+        return {name: observation[self.slices[name]].astype(np.float64) for name in PROPRIOCEPTION}
 
     def flatten(self, parts: Mapping[str, np.ndarray], older_frames: Sequence[np.ndarray], task: int) -> np.ndarray:
         """The observation, clipped to its bounds as a saturating sensor would.

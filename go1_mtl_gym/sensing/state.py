@@ -5,8 +5,8 @@ from functools import cached_property
 
 import numpy as np
 
-from go1_mtl_gym.clock import is_standing
-from go1_mtl_gym.gaits import Gait
+from go1_mtl_gym.gaits import Gait, is_standing
+from go1_mtl_gym.rotations import matrix_from_quat, rpy_from_quat, yaw_matrix
 
 
 @dataclass(frozen=True)
@@ -49,26 +49,12 @@ class RobotState:
     @cached_property
     def rotation(self) -> np.ndarray:
         """Rotation matrix from base to world, shape (3, 3)."""
-        w, x, y, z = self.quat_wxyz
-        return np.array(
-            [
-                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-            ]
-        )
+        return matrix_from_quat(self.quat_wxyz)
 
     @cached_property
     def rpy(self) -> np.ndarray:
         """Roll, pitch, yaw [rad] of R = Rz(yaw) Ry(pitch) Rx(roll), shape (3,)."""
-        w, x, y, z = self.quat_wxyz
-        return np.array(
-            [
-                np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
-                np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0)),
-                np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
-            ]
-        )
+        return rpy_from_quat(self.quat_wxyz)
 
     @cached_property
     def gravity_b(self) -> np.ndarray:
@@ -78,8 +64,7 @@ class RobotState:
     @cached_property
     def base_velocity(self) -> np.ndarray:
         """Measured (vx, vy [m/s], yaw rate [rad/s]) in the heading frame (world turned by yaw), shape (3,)."""
-        yaw = self.rpy[2]
-        cos, sin = np.cos(yaw), np.sin(yaw)
+        (cos, _), (sin, _) = yaw_matrix(self.rpy[2])
         vx, vy, _ = self.linear_velocity_w
         yaw_rate = self.rotation[2] @ self.angular_velocity_b
         return np.array([cos * vx + sin * vy, cos * vy - sin * vx, yaw_rate])

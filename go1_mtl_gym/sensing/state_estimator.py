@@ -9,19 +9,22 @@ the robot's own place in the world; nobody here asks for that.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
-import mujoco
 import numpy as np
 
 from go1_mtl_gym import robot
 from go1_mtl_gym.kinematics import contact_points
+from go1_mtl_gym.rotations import matrix_from_vector, quat_from_matrix
 from go1_mtl_gym.sensing.state import RobotState
-from go1_mtl_gym.validation import number_in
+from go1_mtl_gym.validation import Limits, check_numbers
 
 _GRAVITY_W = np.array([0.0, 0.0, -robot.GRAVITY])
 _SETTLED = 1e-6
 """Variance of velocity [m^2/s^2] and height [m^2] after standing still."""
+_POSITIVE = Limits(1e-4, 1e3)
+_ALLOWED = dict.fromkeys(("attitude_s", "acceleration", "foot_speed", "foot_height"), _POSITIVE)
+_ALLOWED["settle_s"] = Limits(0.0, 1e3)
 
 
 @dataclass(frozen=True)
@@ -48,19 +51,19 @@ class StateEstimatorConfig:
     settle_s: float = 0.01
 
     def __post_init__(self) -> None:
-        for each in fields(self):
-            low = 0.0 if each.name == "settle_s" else 1e-4
-            number_in(getattr(self, each.name), low, 1e3, f"state estimator {each.name}")
+        """Check the numbers."""
+        check_numbers(self, _ALLOWED, "state estimator ")
 
 
 class StateEstimator:
-    """The filter in one episode.
+    """The filter in one episode; a `StateSource`.
 
     Args:
         config: see there.
     """
 
     def __init__(self, config: StateEstimatorConfig) -> None:
+        """Make a filter that has seen nothing yet."""
         self._config = config
 
     def begin(self, state: RobotState, readings: Mapping[str, np.ndarray]) -> None:
@@ -68,7 +71,7 @@ class StateEstimator:
 
         Args:
             state: the true one.
-            readings: as of `update`.
+            readings: as of `advance`.
         """
         self._rotation = state.rotation
         self._position_w = state.position_w + state.rotation @ robot.IMU_POSITION_B  # of the inertial unit
@@ -77,7 +80,7 @@ class StateEstimator:
         self._standing_s = np.zeros(4)
         self._readings = readings
 
-    def update(self, readings: Mapping[str, np.ndarray], seconds: float) -> None:
+    def advance(self, readings: Mapping[str, np.ndarray], seconds: float) -> None:
         """Take in the next readings.
 
         Args:
@@ -98,14 +101,14 @@ class StateEstimator:
         before = self._rotation
         turning_b = np.cross(omega_b, self._velocity_w @ before)  # acceleration of a robot that walks a circle
         towards_up = np.cross((force_b - turning_b) / robot.GRAVITY, before[2]) / self._config.attitude_s
-        self._rotation = before @ _rotation((omega_b + towards_up) * seconds)
+        self._rotation = before @ matrix_from_vector((omega_b + towards_up) * seconds)
         acceleration = (before + self._rotation) @ force_b / 2 + _GRAVITY_W
         self._position_w = self._position_w + (self._velocity_w + acceleration * seconds / 2) * seconds
         self._velocity_w = self._velocity_w + acceleration * seconds
         step = np.eye(4)
         step[3, 2] = seconds
-        own = np.diag([1.0, 1.0, 1.0, seconds**2 / 4]) * (self._config.acceleration * seconds) ** 2
-        self._covariance = step @ self._covariance @ step.T + own
+        noise = np.diag([1.0, 1.0, 1.0, seconds**2 / 4]) * (self._config.acceleration * seconds) ** 2
+        self._covariance = step @ self._covariance @ step.T + noise
 
     def _correct(self, standing: np.ndarray) -> None:
         """The mean of the standing feet says how fast and how high the inertial unit is."""
@@ -115,8 +118,8 @@ class StateEstimator:
         velocity = -self._rotation @ moving_b.mean(axis=0)
         height = -self._rotation[2] @ arms.mean(axis=0)
         error = np.append(velocity - self._velocity_w, height - self._position_w[2])
-        own = [self._config.foot_speed**2] * 3 + [self._config.foot_height**2]
-        gain = np.linalg.solve(self._covariance + np.diag(own) / standing.sum(), self._covariance).T
+        noise = [self._config.foot_speed**2] * 3 + [self._config.foot_height**2]
+        gain = np.linalg.solve(self._covariance + np.diag(noise) / standing.sum(), self._covariance).T
         change = gain @ error
         self._velocity_w = self._velocity_w + change[:3]
         self._position_w = self._position_w + [0.0, 0.0, change[3]]
@@ -128,25 +131,9 @@ class StateEstimator:
         return replace(
             state,
             position_w=self._position_w - rotation @ arm,
-            quat_wxyz=_quat_wxyz(rotation),
+            quat_wxyz=quat_from_matrix(rotation),
             linear_velocity_w=self._velocity_w - rotation @ np.cross(omega, arm),
-            angular_velocity_b=omega,
-            q=self._readings["q"],
-            v=self._readings["dq"],
+            angular_velocity_b=omega.copy(),
+            q=self._readings["q"].copy(),
+            v=self._readings["dq"].copy(),
         )
-
-
-def _rotation(vector: np.ndarray) -> np.ndarray:
-    """The rotation by a vector's length about it [rad], shape (3, 3)."""
-    angle = np.linalg.norm(vector)
-    x, y, z = vector
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    half = np.sinc(angle / (2 * np.pi)) ** 2 / 2  # (1 - cos) / angle^2
-    return np.eye(3) + np.sinc(angle / np.pi) * cross + half * cross @ cross
-
-
-def _quat_wxyz(rotation: np.ndarray) -> np.ndarray:
-    """The unit quaternion of a rotation matrix, shape (4,)."""
-    quat = np.empty(4)
-    mujoco.mju_mat2Quat(quat, rotation.ravel())
-    return quat

@@ -1,11 +1,13 @@
 """What a state estimator on the robot would get wrong; the expert can be asked for its answer to such a state."""
 
-from dataclasses import astuple, dataclass, fields, replace
+from collections.abc import Mapping
+from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 
+from go1_mtl_gym.rotations import quat_from_rpy
 from go1_mtl_gym.sensing.state import RobotState
-from go1_mtl_gym.validation import number_in
+from go1_mtl_gym.validation import Limits, check_numbers
 
 _SIZE = {"height": 1, "attitude": 2, "velocity": 3, "angular_velocity": 3, "q": 12, "dq": 12}
 _END = dict(zip(_SIZE, np.cumsum(list(_SIZE.values())).tolist()))
@@ -45,8 +47,8 @@ class EstimatorNoise:
     dq_bias: float = 0.0
 
     def __post_init__(self) -> None:
-        for each in fields(self):
-            number_in(getattr(self, each.name), 0.0, 10.0, f"estimator noise {each.name}")
+        """Check the numbers."""
+        check_numbers(self, Limits(0.0, 10.0), "estimator noise ")
 
     def scaled(self, factor: float) -> "EstimatorNoise":
         """The same with every standard deviation multiplied by a factor.
@@ -62,7 +64,7 @@ class EstimatorNoise:
 
 
 class EstimatorError:
-    """The errors of one episode, in steps of the control period.
+    """The errors of one episode, in steps of the control period; a `StateSource`.
 
     Args:
         noise: how large they are.
@@ -70,13 +72,20 @@ class EstimatorError:
     """
 
     def __init__(self, noise: EstimatorNoise, seed: int) -> None:
+        """Draw the biases."""
         self._rng = np.random.default_rng(seed)
         self._white = noise.spread()
         self._bias = noise.spread("_bias") * self._rng.standard_normal(len(self._white))
-        self.advance()
+        self._draw()
 
-    def advance(self) -> None:
+    def begin(self, state: RobotState, readings: Mapping[str, np.ndarray]) -> None:
+        """Nothing: the errors of the first state are drawn already."""
+
+    def advance(self, readings: Mapping[str, np.ndarray], seconds: float) -> None:
         """Draw the errors of the next control step."""
+        self._draw()
+
+    def _draw(self) -> None:
         self._now = self._bias + self._white * self._rng.standard_normal(len(self._white))
 
     def estimate(self, state: RobotState) -> RobotState:
@@ -86,22 +95,9 @@ class EstimatorError:
         return replace(
             state,
             position_w=state.position_w + np.r_[0.0, 0.0, error["height"]],
-            quat_wxyz=_quat_wxyz(roll + error["attitude"][0], pitch + error["attitude"][1], yaw),
+            quat_wxyz=quat_from_rpy(roll + error["attitude"][0], pitch + error["attitude"][1], yaw),
             linear_velocity_w=state.linear_velocity_w + state.rotation @ error["velocity"],
             angular_velocity_b=state.angular_velocity_b + error["angular_velocity"],
             q=state.q + error["q"],
             v=state.v + error["dq"],
         )
-
-
-def _quat_wxyz(roll: float, pitch: float, yaw: float) -> np.ndarray:
-    """The unit quaternion of R = Rz(yaw) Ry(pitch) Rx(roll), shape (4,)."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos([roll / 2, pitch / 2, yaw / 2]), np.sin([roll / 2, pitch / 2, yaw / 2])
-    return np.array(
-        [
-            cr * cp * cy + sr * sp * sy,
-            sr * cp * cy - cr * sp * sy,
-            cr * sp * cy + sr * cp * sy,
-            cr * cp * sy - sr * sp * cy,
-        ]
-    )

@@ -1,14 +1,14 @@
 """Ways in which a real robot differs from the model that its expert has in mind: mass, motors, contacts, delay."""
 
-from collections.abc import Sequence
-from dataclasses import astuple, dataclass, fields
+from dataclasses import astuple, dataclass
+from typing import Any
 
 import mujoco
 import numpy as np
 
 from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PHYSICS_HZ
-from go1_mtl_gym.validation import number_in
+from go1_mtl_gym.validation import Limits, check_numbers
 
 PAYLOAD_SIDE = 0.1
 """Side of the cube that the payload is [m]."""
@@ -26,13 +26,13 @@ CHANGED_ARRAYS = (
 """The arrays of a model that `PhysicsParams.apply` writes to."""
 _NONE = -1.0
 _ALLOWED = {
-    "friction": (0.05, 2.0, ""),
-    "payload_kg": (0.0, 10.0, " [kg]"),
-    "action_delay_s": (0.0, 0.05, " [s]"),
-    "motor_strength": (0.5, 1.5, ""),
-    "joint_friction": (0.0, 5.0, " [N m]"),
-    "rotor_inertia": (0.0, 0.1, " [kg m^2]"),
-    "contact_time_s": (0.002, 0.1, " [s]"),
+    "friction": Limits(0.05, 2.0),
+    "payload_kg": Limits(0.0, 10.0, " [kg]"),
+    "action_delay_s": Limits(0.0, 0.05, " [s]"),
+    "motor_strength": Limits(0.5, 1.5),
+    "joint_friction": Limits(0.0, 5.0, " [N m]"),
+    "rotor_inertia": Limits(0.0, 0.1, " [kg m^2]"),
+    "contact_time_s": Limits(0.002, 0.1, " [s]"),
 }
 
 
@@ -62,10 +62,8 @@ class PhysicsParams:
     contact_time_s: float | None = None
 
     def __post_init__(self) -> None:
-        for each in fields(self):
-            value, (low, high, unit) = getattr(self, each.name), _ALLOWED[each.name]
-            if value is not None or each.default is not None:
-                number_in(value, low, high, each.name + unit)
+        """Check the numbers."""
+        check_numbers(self, _ALLOWED)
 
     @property
     def delay_steps(self) -> int:
@@ -77,9 +75,10 @@ class PhysicsParams:
         return np.array([_NONE if value is None else value for value in astuple(self)], dtype=np.float64)
 
     @classmethod
-    def from_vector(cls, vector: Sequence[float]) -> "PhysicsParams":
+    def from_vector(cls, vector: np.ndarray) -> "PhysicsParams":
         """The inverse of `as_vector`."""
-        return cls(*(None if value == _NONE else float(value) for value in vector))
+        values: list[Any] = [None if value == _NONE else value for value in vector.tolist()]
+        return cls(*values)
 
     def apply(self, model: mujoco.MjModel) -> None:
         """Change a model whose PD gains are set already; `mj_setConst` is left to the caller.
@@ -115,6 +114,7 @@ class ActionDelay:
     """
 
     def __init__(self, steps: int) -> None:
+        """Let nothing be on its way but zeros."""
         self.waiting = np.zeros((steps, 12))
 
     def reset(self, target: np.ndarray) -> None:

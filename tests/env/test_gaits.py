@@ -9,7 +9,7 @@ import pytest
 
 from go1_mtl_gym import robot
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.gaits import GAITS, Gait
+from go1_mtl_gym.gaits import GAITS, STAND_COMMAND, Gait, asks_to_stand, check_phase, is_standing, next_phase
 
 EVERY = pytest.mark.parametrize("gait", GAITS.values(), ids=str)
 
@@ -157,3 +157,38 @@ def test_gaits_cannot_be_changed():
         GAITS["trot"].duty = 0.4
     with pytest.raises(TypeError):
         GAITS["trot"] = GAITS["walk"]
+
+
+# -- The clock ---------------------------------------------------------------------------------------------------------
+
+TROT, BOUND = GAITS["trot"], GAITS["bound"]
+STILL, GOING = np.zeros(3), np.array([0.3, 0.0, 0.0])
+
+
+def test_the_clock_by_hand():
+    assert next_phase(TROT, 0.9, GOING, 0.06) == pytest.approx(0.05)  # .06 s of a period of .4 s are .15 cycles
+    assert next_phase(TROT, 0.9, STILL, 0.06) == 0.0, "it stops at the next phase 0, exactly"
+    assert next_phase(TROT, 0.8, STILL, 0.06) == pytest.approx(0.95), "and not before"
+    assert next_phase(TROT, 0.0, STILL, 0.06) == 0.0
+    assert next_phase(TROT, 0.0, GOING, 0.06) == pytest.approx(0.15)
+    assert next_phase(BOUND, 0.0, STILL, 0.08) == pytest.approx(0.25), "a bound cannot stand"
+    assert next_phase(TROT, 1.0 - 1e-12, STILL, 1e-15) == 0.0, "a sum that ends just below a whole cycle is whole"
+
+
+def test_the_box_of_commands_that_ask_for_a_stand():
+    assert STAND_COMMAND == (0.02, 0.02, 0.04)
+    for axis in range(3):
+        for sign in (-1, 1):
+            command = np.zeros(3)
+            command[axis] = sign * (STAND_COMMAND[axis] - 1e-9)
+            assert is_standing(TROT, 0.0, command) and not is_standing(BOUND, 0.0, command)
+            assert not is_standing(TROT, 1e-9, command)
+            command[axis] = sign * STAND_COMMAND[axis]
+            assert not asks_to_stand(TROT, command)
+
+
+def test_a_phase_is_a_number_of_a_cycle():
+    assert check_phase(np.float32(0.25)) == 0.25
+    for phase in (1.0, -0.1, "late", True):
+        with pytest.raises(InvalidInputError, match="phase"):
+            check_phase(phase)

@@ -135,7 +135,7 @@ def test_bounds_are_finite_ordered_and_zero_to_one_for_flags():
         ({"channels": ("phase", "phase")}, "differ"),
         ({"history": 0}, "history.*1 to 50.*got 0"),
         ({"history": 51}, "history.*51"),
-        ({"history": 2.0}, "history.*2.0"),
+        ({"history": 2.5}, "history.*2.5"),
     ],
 )
 def test_impossible_layouts_are_refused(arguments, words):

@@ -69,7 +69,7 @@ def test_it_begins_with_the_state_of_a_robot_that_stands():
 def test_in_the_air_it_integrates():
     estimator = begun(standing(), attitude_s=1e3)
     for _ in range(100):
-        estimator.update(READINGS | {"accelerometer": UP + [1.0, 0.0, -2.0]}, 0.01)
+        estimator.advance(READINGS | {"accelerometer": UP + [1.0, 0.0, -2.0]}, 0.01)
     seen = estimator.estimate(standing())
     # The first period begins with a reading of rest, so the mean acceleration over it is half.
     np.testing.assert_allclose(seen.linear_velocity_w, np.array([1.0, 0.0, -2.0]) * 0.995, atol=0.02)
@@ -79,9 +79,9 @@ def test_in_the_air_it_integrates():
 def test_the_gyroscope_turns_it():
     estimator = begun(standing(), attitude_s=1e3)
     turning = READINGS | {"gyroscope": np.array([0.0, 0.0, 0.5])}
-    estimator.update(turning, 0.0)
+    estimator.advance(turning, 0.0)
     for _ in range(200):
-        estimator.update(turning, 0.01)
+        estimator.advance(turning, 0.01)
     assert estimator.estimate(standing()).rpy == pytest.approx([0.0, 0.0, 1.0], abs=1e-6)
     np.testing.assert_array_equal(estimator.estimate(standing()).angular_velocity_b, [0.0, 0.0, 0.5])
 
@@ -91,7 +91,7 @@ def test_the_accelerometer_sees_up_in_the_time_it_is_given():
     state = standing(quat_wxyz=np.array([np.cos(tilt / 2), np.sin(tilt / 2), 0.0, 0.0]))
     estimator = begun(state, attitude_s=2.0)  # believes in a roll that is none
     for _ in range(200):
-        estimator.update(READINGS, 0.01)
+        estimator.advance(READINGS, 0.01)
     assert estimator.estimate(state).rpy[0] == pytest.approx(tilt * np.exp(-1.0), rel=0.02)
 
 
@@ -101,7 +101,7 @@ def test_feet_that_stand_say_how_fast_and_how_high_the_trunk_is():
     dq[1::3] = 1.0  # thighs swing back under the trunk, or the trunk moves over its feet
     moving = READINGS | {"dq": dq, "contacts": np.array([1.0, 0.0, 0.0, 1.0])}
     for _ in range(1000):
-        estimator.update(moving, 0.002)
+        estimator.advance(moving, 0.002)
     seen = estimator.estimate(standing())
     reach = robot.STANDING_HEIGHT
     assert seen.position_w[2] == pytest.approx(reach, abs=1e-3)
@@ -113,9 +113,9 @@ def test_a_foot_counts_once_it_has_settled():
     landed = READINGS | {"dq": dq, "contacts": np.ones(4)}
     estimator = begun(standing(), settle_s=0.009)
     for _ in range(4):
-        estimator.update(landed, 0.002)
+        estimator.advance(landed, 0.002)
         np.testing.assert_allclose(estimator.estimate(standing()).linear_velocity_w, 0.0, atol=1e-12)
-    estimator.update(landed, 0.002)
+    estimator.advance(landed, 0.002)
     assert np.linalg.norm(estimator.estimate(standing()).linear_velocity_w) > 1e-3
 
 

@@ -118,7 +118,7 @@ def test_degrees_of_physics_params_travel_with_the_policy(tmp_path):
 
 def test_what_cannot_be_saved_is_refused_when_the_policy_is_made():
     env = StubEnv()
-    with pytest.raises(InvalidInputError, match="JSON.*expert is named as"):
+    with pytest.raises(InvalidInputError, match="expert.* must be something that JSON can hold"):
         MultiHeadPolicy(env.observation_space, env.action_space, contract=env.contract, env_kwargs={"expert": object()})
 
 

@@ -4,12 +4,14 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 
 import pytest
 
 from go1_mtl_gym import InvalidInputError
 from trainers.utils.cli import main
+from trainers.utils.processes import keep_interrupts
 
 
 def ends_with(error: BaseException | None) -> int:
@@ -53,6 +55,18 @@ def test_a_bug_keeps_its_traceback():
 
 def environment() -> dict[str, str]:
     return os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+
+
+def test_ctrl_c_waits_until_the_workers_have_begun():
+    other = threading.Thread(target=time.sleep, args=(0.5,))  # may receive the signal in this one's place
+    other.start()
+    handler, begun = signal.getsignal(signal.SIGINT), False
+    with pytest.raises(KeyboardInterrupt), keep_interrupts():
+        os.kill(os.getpid(), signal.SIGINT)
+        other.join()
+        begun = True
+    assert begun and signal.getsignal(signal.SIGINT) is handler
+    assert not signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
 
 _WORKERS = """

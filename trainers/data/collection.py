@@ -1,7 +1,7 @@
 """Asking the expert: demonstrations as a pure function of their description, made in parallel and resumable."""
 
 import dataclasses
-import json
+import functools
 from collections.abc import Callable, Iterable, Sequence
 from os import PathLike
 from pathlib import Path
@@ -15,9 +15,12 @@ from tqdm.auto import tqdm
 from go1_mtl_gym.contract import terms_of
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
 from go1_mtl_gym.sensing.observation import ObservationLayout
+from go1_mtl_gym.validation import finite_vector, integer_in
 from trainers.data.demonstrations import Demonstrations
 from trainers.data.environments import EnvFactory, PerturbationConfig, WithTasks, derive_seed, make_env
+from trainers.utils.files import json_form
 from trainers.utils.processes import keep_interrupts
+from trainers.utils.validation import positive
 
 BEFORE_FALL_S = 0.24
 """The last seconds before a fall are not worth imitating and are dropped [s]."""
@@ -47,7 +50,9 @@ class CollectJob:
         env_kwargs: of the environment.
 
     Raises:
-        InvalidInputError: if the seed is negative or the seconds are not positive.
+        InvalidInputError: if the seed is no whole number of at least 0, the seconds are not positive, the command is
+            not three finite numbers, or an argument of the environment has no JSON form: the shard could not say how it
+            was made. Numpy's numbers become Python's.
     """
 
     task: str
@@ -58,10 +63,16 @@ class CollectJob:
     env_kwargs: dict[str, Any] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if self.seed < 0 or not self.seconds > 0:
-            raise InvalidInputError(f"seed must be >= 0 and seconds > 0, got {self.seed} and {self.seconds}")
+        set_field = functools.partial(object.__setattr__, self)
+        set_field("seed", integer_in(self.seed, 0, 2**63 - 1, "seed"))
+        set_field("seconds", positive(self.seconds, "seconds"))
         if self.command is not None:
-            object.__setattr__(self, "command", tuple(float(value) for value in self.command))
+            set_field("command", tuple(finite_vector(self.command, 3, "command (vx, vy, yaw rate)").tolist()))
+        if not (self.perturbation is None or isinstance(self.perturbation, PerturbationConfig)):
+            raise InvalidInputError(f"perturbation must be a PerturbationConfig or None, got {self.perturbation!r}")
+        set_field("env_kwargs", dict(self.env_kwargs))
+        for name, value in self.env_kwargs.items():
+            json_form(value, f"env_kwargs[{name!r}]")
 
     @property
     def name(self) -> str:
@@ -70,7 +81,7 @@ class CollectJob:
 
     def as_dict(self) -> dict[str, Any]:
         """The description as JSON values."""
-        return json.loads(json.dumps(dataclasses.asdict(self)))
+        return json_form(self, "job")
 
 
 def collect(

@@ -13,7 +13,7 @@ import numpy as np
 import go1_mtl_gym
 from go1_mtl_gym.contract import PolicyContract
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
-from go1_mtl_gym.validation import interval_s, number_in
+from go1_mtl_gym.validation import interval_s, number_in, one_of
 from trainers.utils.processes import keep_interrupts
 
 EnvFactory = Callable[..., gymnasium.Env]
@@ -75,7 +75,12 @@ def make_env(task: str | None, perturbation: PerturbationConfig | None = None, *
         task: name of a task; None for the multi-gait environment.
         perturbation: disturbances of the executed action, or None.
         env_kwargs: of `go1_mtl_gym.Go1Env`.
+
+    Raises:
+        InvalidInputError: if the task is not registered, or an argument is not as described.
     """
+    if task is not None:
+        one_of(task, tuple(go1_mtl_gym.TASKS), "task")
     env = gymnasium.make(go1_mtl_gym.env_id(task), disable_env_checker=True, **env_kwargs)
     if perturbation is not None:
         env = go1_mtl_gym.PerturbationWrapper(env, **dataclasses.asdict(perturbation))
@@ -105,25 +110,36 @@ def make_venv(
         InvalidInputError: if `per_task` is less than 1.
         WorkerError: if a process ends before it has made its environment.
     """
-    from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv
+    from stable_baselines3.common.vec_env import DummyVecEnv
 
     if per_task < 1:
         raise InvalidInputError(f"per_task must be at least 1, got {per_task}")
     kwargs = dict(env_kwargs or {})
     calls = [functools.partial(make_env, task, perturbation, **kwargs) for task in tasks]
     thunks = [WithTasks(call) for call in calls for _ in range(per_task)]
-    if not subproc:
-        return DummyVecEnv(thunks)
+    return _in_processes(thunks) if subproc else DummyVecEnv(thunks)
+
+
+def _in_processes(thunks: "Sequence[WithTasks]") -> Any:
+    """A vector environment with a process per environment, which leaves Ctrl-C to this one."""
+    from stable_baselines3.common.vec_env import SubprocVecEnv
+
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         raise SystemExit(1)  # a worker that imports a script without a main guard; the script is told, by its own error
+    venv = None
     try:
         with keep_interrupts():
-            return SubprocVecEnv(thunks, start_method="spawn")
+            venv = SubprocVecEnv(list(thunks), start_method="spawn")
     except (EOFError, ConnectionError):
         raise WorkerError(
             "a worker process ended before it had made its environment; a script that makes environments with "
             'subproc=True must do so below `if __name__ == "__main__":`, because every worker imports it again'
         ) from None
+    except KeyboardInterrupt:
+        if venv is not None:  # it came while the processes began
+            venv.close()
+        raise
+    return venv
 
 
 def contracts_of(venv: Any) -> tuple[PolicyContract, ...]:

@@ -10,6 +10,7 @@ from go1_mtl_gym.errors import InvalidInputError
 from trainers.data.environments import EnvFactory, derive_seed, make_env
 from trainers.evaluation.rollout import Rollout, controller, opened, run_all
 from trainers.evaluation.scoring import ClosedLoopResult, EpisodeRecord, score
+from trainers.utils.validation import refuse_overridden
 
 
 def evaluate(
@@ -47,10 +48,11 @@ def evaluate(
         n_jobs: processes.
         progress: show a bar.
         make_env: another environment factory.
-        env_kwargs: of the environment; on top of the policy's own ``env_kwargs``.
+        env_kwargs: of the environment; on top of the policy's own ``env_kwargs``, but not in place of the arguments
+            here: no ``episode_s``.
 
     Raises:
-        InvalidInputError: if an argument is not as described.
+        InvalidInputError: if an argument is not as described, or the policy is for another environment.
     """
     if task not in TASKS:
         raise InvalidInputError(f"task must be one of {', '.join(TASKS)}; got {task!r}")
@@ -62,13 +64,14 @@ def evaluate(
         raise InvalidInputError(f"commands are given or drawn from corners, got corners=True and {commands}")
     if command_interval is not None and not command_interval > 0:
         raise InvalidInputError(f"command_interval must be None or positive, got {command_interval}")
+    refuse_overridden(env_kwargs, episode_s="seconds", task="task")
     controller(policy_or_expert, None)
     kwargs = {**getattr(policy_or_expert, "env_kwargs", {}), **env_kwargs, "episode_s": seconds}
 
     def call(i: int) -> tuple[Any, ...]:
         command = None if commands is None else tuple(commands[i % len(commands)])
-        own_seed = derive_seed("evaluate", task, seed, i)
-        return policy_or_expert, task, own_seed, command, command_interval, corners, kwargs, make_env
+        episode_seed = derive_seed("evaluate", task, seed, i)
+        return policy_or_expert, task, episode_seed, command, command_interval, corners, kwargs, make_env
 
     records = run_all(_episode, map(call, range(episodes)), episodes, n_jobs, progress, f"evaluate {task}")
     return ClosedLoopResult(task, float(seconds), tuple(records))

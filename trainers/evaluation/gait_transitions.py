@@ -10,6 +10,7 @@ from go1_mtl_gym.validation import one_of
 from trainers.data.environments import EnvFactory, derive_seed, make_env
 from trainers.evaluation.rollout import Rollout, controller, opened, run_all
 from trainers.evaluation.scoring import ClosedLoopResult, EpisodeRecord, score
+from trainers.utils.validation import refuse_overridden
 
 
 def evaluate_transition(
@@ -29,7 +30,7 @@ def evaluate_transition(
     """Walk in one gait, change to another, and score what follows as `trainers.evaluate` scores an episode.
 
     A trial starts standing in the first task, with a command drawn from what lies in both tasks' ranges. After
-    `before_s` and a random share of the first gait's period comes ``set_task(second)``, and the command goes on; a
+    `before_s` and a random fraction of the first gait's period comes ``set_task(second)``, and the command goes on; a
     policy hears of it with its next observation. The scores are of the time after that; their first 2 s count for
     survival only. A fall before the change is a failure too, with a survival of 0 s. Trial i depends on (first, second,
     seed, i) alone.
@@ -53,6 +54,7 @@ def evaluate_transition(
     Raises:
         InvalidInputError: if an argument is not as described.
     """
+    refuse_overridden(env_kwargs, episode_s="before_s and after_s", task="first")
     kwargs = {**getattr(policy_or_expert, "env_kwargs", {}), **env_kwargs}
     for task in (first, second):
         one_of(task, tuple(kwargs.get("tasks") or TASKS), "task")
@@ -64,8 +66,8 @@ def evaluate_transition(
     kwargs["episode_s"] = before_s + TASKS[first].gait.period + after_s + 1.0
 
     def call(i: int) -> tuple[Any, ...]:
-        own_seed = derive_seed("switch", first, second, seed, i)
-        return policy_or_expert, first, second, own_seed, before_s, after_s, kwargs, make_env
+        trial_seed = derive_seed("switch", first, second, seed, i)
+        return policy_or_expert, first, second, trial_seed, before_s, after_s, kwargs, make_env
 
     title = f"{first} to {second}"
     records = run_all(_trial, map(call, range(trials)), trials, n_jobs, progress, title)

@@ -13,6 +13,7 @@ from go1_mtl_gym.errors import InvalidInputError
 from trainers.data.environments import make_env
 from trainers.evaluation.rollout import begin, controller
 from trainers.utils.files import write_atomically
+from trainers.utils.validation import refuse_overridden
 
 COLORS = 128
 """Entries of the palette that all frames of a GIF share."""
@@ -61,6 +62,7 @@ def record_frames(
         raise InvalidInputError(f"seconds must be > 0 and fps from 1 to {MAX_FPS}, got {seconds} and {fps}")
     if min(width, height) < 16 or max(width, height) > 4096:
         raise InvalidInputError(f"width and height must be from 16 to 4096 pixels, got {width} and {height}")
+    refuse_overridden(env_kwargs, episode_s="seconds", render_mode="record_frames", task="task")
     kwargs = {**getattr(policy_or_expert, "env_kwargs", {}), **env_kwargs, "episode_s": seconds + 1.0}
     kwargs |= {"render_mode": "rgb_array", "width": 2 * width, "height": 2 * height}
     env = make_env(task, None, **kwargs)

@@ -1,17 +1,16 @@
 """What a policy knows of the environment that it is for."""
 
-import dataclasses
-import json
+import functools
 from collections.abc import Mapping
 from typing import Any
 
 import gymnasium
-import numpy as np
 
 from go1_mtl_gym.contract import PolicyContract
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import one_of
 from trainers.data.environments import make_env
+from trainers.utils.files import json_form
 
 
 class ForEnvironment:
@@ -61,21 +60,15 @@ class ForEnvironment:
 
 
 def json_arguments(env_kwargs: Mapping[str, Any]) -> dict[str, Any]:
-    """An environment's arguments as JSON values: numpy's numbers become Python's, frozen dataclasses dictionaries.
+    """An environment's arguments as JSON values that the environment takes too.
 
     Raises:
         InvalidInputError: if one of them has no such form, so that a policy with it could not be saved.
     """
-    ready = {}
-    for name, value in env_kwargs.items():
-        plain = dataclasses.asdict(value) if dataclasses.is_dataclass(value) and not isinstance(value, type) else value
-        plain = plain.item() if isinstance(plain, np.generic) else plain
-        try:
-            json.dumps(plain, allow_nan=False)
-        except (TypeError, ValueError) as error:
-            raise InvalidInputError(
-                f"env_kwargs[{name!r}] must be a JSON value to be saved with the policy, got {value!r} "
-                '(an expert is named as "module:name")'
-            ) from error
-        ready[name] = plain
-    return ready
+    partial = [name for name, value in env_kwargs.items() if isinstance(value, functools.partial)]
+    if partial:
+        raise InvalidInputError(
+            f"env_kwargs[{partial[0]!r}] must be a name that a file can hold, got {env_kwargs[partial[0]]!r}: put it "
+            'at the top level of a module and name it as "module:name"'
+        )
+    return {name: json_form(value, f"env_kwargs[{name!r}]") for name, value in env_kwargs.items()}

@@ -63,6 +63,8 @@ class MultiHeadPolicy(SavedPolicy, ForEnvironment, ActorCriticPolicy):
         seed: of the initial weights, without touching torch's global generator; None draws from that generator.
         optimizer_class: for on-policy learning.
         optimizer_kwargs: of `optimizer_class`, without the learning rate.
+        critic_lr_factor: ``lr_factor`` of the critic's group of parameters, for an optimizer that knows it
+            (`trainers.algorithms.ppo.ActorCriticAdam`).
 
     Raises:
         InvalidInputError: if an argument is not as described, neither contract nor number of tasks is given, or the
@@ -89,6 +91,7 @@ class MultiHeadPolicy(SavedPolicy, ForEnvironment, ActorCriticPolicy):
         seed: int | None = None,
         optimizer_class: type[torch.optim.Optimizer] = torch.optim.Adam,
         optimizer_kwargs: dict[str, Any] | None = None,
+        critic_lr_factor: float = 1.0,
         use_sde: bool = False,
     ) -> None:
         if contract is not None and n_tasks is None:
@@ -104,6 +107,7 @@ class MultiHeadPolicy(SavedPolicy, ForEnvironment, ActorCriticPolicy):
         self.clip_sd = float(clip_sd)
         self.extra_env_kwargs = json_arguments(env_kwargs or {})
         self.seed = seed
+        self.critic_lr_factor = float(critic_lr_factor)
         super().__init__(
             observation_space,
             action_space,
@@ -124,7 +128,11 @@ class MultiHeadPolicy(SavedPolicy, ForEnvironment, ActorCriticPolicy):
         self.obs_normalizer = norm.Normalizer(n_inputs)
         self.act_normalizer = norm.Normalizer(n_actions)
         self.log_std = nn.Parameter(torch.full((n_actions,), float(self.log_std_init)))
-        self.optimizer = self.optimizer_class(self.parameters(), lr=lr_schedule(1), **self.optimizer_kwargs)
+        groups = [
+            {"params": [*self.actor.parameters(), self.log_std]},
+            {"params": list(self.critic.parameters()), "lr_factor": self.critic_lr_factor},
+        ]
+        self.optimizer = self.optimizer_class(groups, lr=lr_schedule(1), **self.optimizer_kwargs)
 
     def network_kwargs(self) -> dict[str, Any]:
         """Constructor arguments that shape the network: also ``policy_kwargs`` for a PPO that starts from it."""
@@ -147,6 +155,7 @@ class MultiHeadPolicy(SavedPolicy, ForEnvironment, ActorCriticPolicy):
             "lr_schedule": _constant_rate,
             "optimizer_class": self.optimizer_class,
             "optimizer_kwargs": self.optimizer_kwargs,
+            "critic_lr_factor": self.critic_lr_factor,
             "seed": self.seed,
             **self.network_kwargs(),
         }

@@ -7,9 +7,9 @@ import torch
 from gymnasium import spaces
 from stable_baselines3.common.policies import BasePolicy
 
-from go1_mtl_gym.clock import STAND_COMMAND
 from go1_mtl_gym.contract import terms_of
 from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.gaits import STAND_COMMAND
 from go1_mtl_gym.sensing.observation import ObservationLayout
 from trainers.policies.checkpoint import Checkpoint, SavedPolicy, tensors_of
 from trainers.policies.environment import ForEnvironment

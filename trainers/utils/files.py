@@ -1,14 +1,18 @@
 """Files that are either complete or not there."""
 
+import dataclasses
+import functools
 import json
 import math
 import os
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
+
+from go1_mtl_gym.errors import InvalidInputError
 
 
 def write_atomically(path: str | os.PathLike[str], write: Callable[[BinaryIO], None]) -> None:
@@ -45,3 +49,38 @@ def json_ready(value: Any) -> Any:
     if isinstance(value, np.generic):
         value = value.item()
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def json_form(value: Any, name: str) -> Any:
+    """JSON values that describe something, so that it can be written down and compared.
+
+    Frozen dataclasses become dictionaries, sequences lists, numpy's numbers Python's, what stands at the top level of a
+    module its ``"module:name"``, and a `functools.partial` a dictionary of function and arguments.
+
+    Args:
+        value: what is described.
+        name: of the value, in the message.
+
+    Raises:
+        InvalidInputError: if it has no such form.
+    """
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {each.name: json_form(getattr(value, each.name), name) for each in dataclasses.fields(value)}
+    if isinstance(value, Mapping):
+        return {str(key): json_form(item, f"{name}[{key!r}]") for key, item in value.items()}
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [json_form(item, name) for item in value]
+    if isinstance(value, np.generic):
+        return json_form(value.item(), name)
+    if isinstance(value, functools.partial):
+        arguments = {"args": json_form(value.args, name), "keywords": json_form(value.keywords, name)}
+        return {"partial": json_form(value.func, name), **arguments}
+    if value is None or isinstance(value, (bool, int, str)) or (isinstance(value, float) and math.isfinite(value)):
+        return value
+    module, qualified = getattr(value, "__module__", None), getattr(value, "__qualname__", "<")
+    if callable(value) and module and "<" not in qualified:
+        return f"{module}:{qualified}"
+    raise InvalidInputError(
+        f"{name} must be something that JSON can hold, a frozen dataclass of it, or a function or class at the top "
+        f"level of a module, got {value!r}"
+    )

@@ -1,4 +1,4 @@
-"""The gait clock and the command filter, worked by hand, and what the environment makes of them."""
+"""The command filter, worked by hand, and the course of an episode: its clock, its stands, its changes of task."""
 
 import dataclasses
 
@@ -6,47 +6,24 @@ import numpy as np
 import pytest
 
 from go1_mtl_gym import GAITS, TASKS, robot
-from go1_mtl_gym.clock import STAND_COMMAND, asks_to_stand, is_standing, next_phase
 from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.episode import COMMAND_SLEW, filtered
+from go1_mtl_gym.gaits import STAND_COMMAND
 
-TROT, BOUND = GAITS["trot"], GAITS["bound"]
-STILL, GOING = np.zeros(3), np.array([0.3, 0.0, 0.0])
+STILL = np.zeros(3)
 
 
 def home(env: Go1Env) -> np.ndarray:
     return env.action_map.from_radians(robot.HOME_POSE)
 
 
-def test_the_clock_by_hand():
-    assert next_phase(TROT, 0.9, GOING, 0.06) == pytest.approx(0.05)  # .06 s of a period of .4 s are .15 cycles
-    assert next_phase(TROT, 0.9, STILL, 0.06) == 0.0, "it stops at the next phase 0, exactly"
-    assert next_phase(TROT, 0.8, STILL, 0.06) == pytest.approx(0.95), "and not before"
-    assert next_phase(TROT, 0.0, STILL, 0.06) == 0.0
-    assert next_phase(TROT, 0.0, GOING, 0.06) == pytest.approx(0.15)
-    assert next_phase(BOUND, 0.0, STILL, 0.08) == pytest.approx(0.25), "a bound cannot stand"
-    assert next_phase(TROT, 1.0 - 1e-12, STILL, 1e-15) == 0.0, "a sum that ends just below a whole cycle is whole"
-
-
-def test_the_box_of_commands_that_ask_for_a_stand():
-    assert STAND_COMMAND == (0.02, 0.02, 0.04)
-    for axis in range(3):
-        for sign in (-1, 1):
-            command = np.zeros(3)
-            command[axis] = sign * (STAND_COMMAND[axis] - 1e-9)
-            assert is_standing(TROT, 0.0, command) and not is_standing(BOUND, 0.0, command)
-            assert not is_standing(TROT, 1e-9, command)
-            command[axis] = sign * STAND_COMMAND[axis]
-            assert not asks_to_stand(TROT, command)
-
-
 def test_the_filter_by_hand():
     assert COMMAND_SLEW == (4.0, 4.0, 8.0)
-    share = 1 - np.exp(-0.1)  # .02 s of .2 s
-    np.testing.assert_allclose(filtered(np.array([0.4, 0, 0]), STILL, 0.02), [0.4 * share, 0, 0])
+    fraction = 1 - np.exp(-0.1)  # .02 s of .2 s
+    np.testing.assert_allclose(filtered(np.array([0.4, 0, 0]), STILL, 0.02), [0.4 * fraction, 0, 0])
     # 2 m/s would be followed by .19 m/s in .02 s; the limit is 4 x .02 = .08. Likewise 2 rad/s: .19 becomes .16.
     np.testing.assert_allclose(filtered(np.array([2.0, -2.0, -2.0]), STILL, 0.02), [0.08, -0.08, -0.16])
-    np.testing.assert_allclose(filtered(STILL, np.array([1.0, 0.1, 0.0]), 0.02), [0.92, 0.1 - 0.1 * share, 0.0])
+    np.testing.assert_allclose(filtered(STILL, np.array([1.0, 0.1, 0.0]), 0.02), [0.92, 0.1 - 0.1 * fraction, 0.0])
 
 
 @pytest.mark.parametrize("seconds", [0.001, 0.005, 0.02])
@@ -94,7 +71,7 @@ def test_standing_is_a_function_of_gait_phase_and_command():
     assert env.state.standing
     assert not dataclasses.replace(env.state, phase=0.5).standing
     assert not dataclasses.replace(env.state, command=np.array([0.02, 0.0, 0.0])).standing
-    assert not dataclasses.replace(env.state, gait=BOUND).standing
+    assert not dataclasses.replace(env.state, gait=GAITS["bound"]).standing
 
 
 def test_the_state_tells_the_time():

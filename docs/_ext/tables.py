@@ -1,0 +1,239 @@
+"""Tables in Markdown that are made from the code when the site is built, so that they cannot go stale."""
+
+import inspect
+import re
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import fields
+
+from go1_mtl_gym import (
+    TASKS,
+    DomainRandomization,
+    EnvConfig,
+    PDGains,
+    PhysicsParams,
+    RewardWeights,
+    SensorNoise,
+    env_id,
+    robot,
+)
+from go1_mtl_gym.actuation import ActionMap
+from go1_mtl_gym.sensing.observation import CHANNELS, UNITS, ObservationLayout
+from trainers.pipeline.command_line import job_parser
+from trainers.pipeline.config import JobConfig
+from trainers.pipeline.presets import PRESETS
+
+CONTENT = {
+    "accelerometer": "specific force at the IMU, trunk frame",
+    "gyroscope": "angular velocity, trunk frame",
+    "q": "joint positions, legs FL FR RL RR, joints hip thigh calf",
+    "dq": "joint velocities, same order",
+    "contacts": "feet on the ground, FL FR RL RR",
+    "command": "filtered command: vx, vy, yaw rate",
+    "gravity": "unit vector of gravity, trunk frame",
+    "phase": "sine and cosine of the gait clock",
+    "last_action": "the action of the last step",
+    "task": "one-hot task id, in the order of `tasks`",
+}
+"""What the parts of an observation hold."""
+
+SETTINGS = {
+    "control_hz": "control rate [Hz]",
+    "channels": "channels",
+    "clean_s": "clean demonstrations per gait [s]",
+    "perturbed_s": "perturbed demonstrations per gait [s]",
+    "randomized": "fraction of perturbed episodes with other physics",
+    "task_interval": "time between gait transitions in them [s]",
+    "held_out_s": "held-out demonstrations per gait [s]",
+    "rounds": "DAgger rounds",
+    "dagger_s": "per gait and round [s]",
+    "width": "units per hidden layer",
+    "normalization": "normalization",
+    "batch_size": "rows per gradient step",
+    "clone_steps": "gradient steps of cloning",
+    "round_steps": "gradient steps per round",
+    "phase_free_s": "walks of the policy that teach it the phase, per gait [s]",
+    "episodes": "evaluation episodes per gait and agent",
+    "episode_s": "duration of an episode [s]",
+}
+"""Settings of the main job that its table shows, and what they are called there."""
+OF_ROUNDS = ("dagger_s", "round_steps")
+"""Those that mean nothing without a DAgger round."""
+
+
+def markdown(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """A Markdown table; columns of numbers are set right, the others left."""
+    cells = [[str(cell) for cell in row] for row in rows]
+    rule = ["--:" if all(re.fullmatch(r"[-±.\d ]+", cell) for cell in column) else ":--" for column in zip(*cells)]
+    return "\n".join("| " + " | ".join(line) + " |" for line in (header, rule, *cells))
+
+
+def _unit(name: str) -> str:
+    return "0 or 1" if name in ("contacts", "task") else UNITS.get(name, "-").replace("^2", "²")
+
+
+def gaits() -> str:
+    """Contact plan of every task that comes with the package."""
+    header = ("gait", "id", "period [s]", "duty", "offsets FL FR RL RR", "steps/s", "swing [m]", "stands")
+    rows = []
+    for task in TASKS.values():
+        gait = task.gait
+        rows.append(
+            (
+                task.name,
+                f"`{env_id(task.name).partition(':')[2]}`",
+                f"{gait.period:.2f}",
+                f"{gait.duty:.2f}",
+                " ".join(f"{offset:g}" for offset in gait.offsets),
+                f"{gait.step_rate:.2f}",
+                f"{gait.swing_height:.2f}",
+                "yes" if gait.can_stand else "no",
+            )
+        )
+    return markdown(header, rows)
+
+
+def commands() -> str:
+    """Ranges and limits of every task's commands."""
+    header = ("gait", "drawn: vx", "vy [m/s]", "yaw rate [rad/s]", "accepted: vx", "vy [m/s]", "yaw rate [rad/s]")
+    return markdown(
+        header,
+        [(task.name, *(f"± {x:g}" for x in (*task.command_range, *task.command_limit))) for task in TASKS.values()],
+    )
+
+
+def actions() -> str:
+    """The twelve entries of an action, with the default gains."""
+    action_map = ActionMap.for_gains(PDGains())
+    low, high = action_map.to_radians(-1.0), action_map.to_radians(1.0)
+    header = ("index", "joint", "-1 [rad]", "0 [rad]", "+1 [rad]", "joint range [rad]", "torque limit [N m]")
+    rows = [
+        (
+            index,
+            f"`{joint.removesuffix('_joint')}`",
+            f"{low[index]:.3f}",
+            f"{action_map.center[index]:.3f}",
+            f"{high[index]:.3f}",
+            f"{robot.JOINT_LOWER[index]:.3f} ... {robot.JOINT_UPPER[index]:.3f}",
+            f"{robot.TORQUE_LIMIT[index]:g}",
+        )
+        for index, joint in enumerate(robot.JOINTS)
+    ]
+    return markdown(header, rows)
+
+
+def _layout_table(layout: ObservationLayout) -> str:
+    rows = []
+    for name, where in layout.slices.items():
+        size, span = where.stop - where.start, f"{where.start} ... {where.stop - 1}"
+        rows.append((f"`{name}`", span, size, _unit(name), CONTENT[name]))
+    return markdown(("part", "entries", "size", "unit", "content"), rows)
+
+
+def default_observation() -> str:
+    """The observation of an environment that was made without arguments."""
+    return _layout_table(EnvConfig().layout)
+
+
+def paper_observation() -> str:
+    """The observation of arXiv 2505.08574: 34 numbers and the task id."""
+    return _layout_table(ObservationLayout(EnvConfig().tasks))
+
+
+def optional_parts() -> str:
+    """Parts of an observation that are there when asked for."""
+    rows = [(f"`{name}`", size, _unit(name), CONTENT[name]) for name, size in CHANNELS.items()]
+    rows.append(("`history`", "34 (n - 1)", "-", "with `history=n`: the n - 1 frames before this one, newest first"))
+    return markdown(("channel", "size", "unit", "content"), rows)
+
+
+def physics() -> str:
+    """Ways in which the physics can differ, with the ranges of `DomainRandomization`."""
+    meaning, ranges = described(PhysicsParams), DomainRandomization()
+    rows = []
+    for each in fields(PhysicsParams):
+        low, high = getattr(ranges, each.name)
+        rows.append((f"`{each.name}`", f"`{each.default}`", f"{low:g} ... {high:g}", meaning[each.name]))
+    low, high = ranges.noise
+    rows.append(("`noise`", "", f"{low:g} ... {high:g}", "factor on the sensor noise, or on the default one"))
+    return markdown(("argument", "default", "randomized over", "meaning"), rows)
+
+
+def sensor_noise() -> str:
+    """Standard deviations of the default sensor noise."""
+    rows = [(f"`{each.name}`", f"{each.default:g}", _unit(each.name)) for each in fields(SensorNoise)]
+    return markdown(("reading", "standard deviation", "unit"), rows)
+
+
+def rewards() -> str:
+    """Terms of the reward and their weights."""
+    formula = {
+        "velocity": r"$\exp(-\lVert v_{xy} - c_{xy} \rVert^2 / 0.25)$",
+        "yaw_rate": r"$\exp(-(\omega - c_\omega)^2 / 0.25)$",
+        "posture": r"$-(g_x^2 + g_y^2 + \min(((z - z_0) / 0.1)^2, 4))$",
+        "effort": r"$-\frac{1}{12} \sum_j (\tau_j / \tau_{j,\mathrm{max}})^2$",
+        "alive": "$1$",
+    }
+    rows = [(f"`{each.name}`", f"{each.default:g}", formula[each.name]) for each in fields(RewardWeights)]
+    return markdown(("term", "weight", "value"), rows)
+
+
+def arguments() -> str:
+    """Every keyword argument of the environment, with its default."""
+    meaning = described(EnvConfig)
+    defaults = {each.name: each.default for each in fields(EnvConfig) if each.name != "physics"}
+    rows = [(f"`{name}`", f"`{default!r}`", meaning[name]) for name, default in defaults.items()]
+    return markdown(("argument", "default", "meaning"), rows)
+
+
+def job_options() -> str:
+    """Options of the main job on the command line."""
+    actions = [action for action in job_parser()._actions if action.dest != "help"]
+    return markdown(("option", "meaning"), [(f"`{action.option_strings[0]}`", action.help) for action in actions])
+
+
+def presets() -> str:
+    """What the presets of the main job do."""
+    configs = [JobConfig(**settings) for settings in PRESETS.values()]
+    rows = [[label, *(_setting(config, name) for config in configs)] for name, label in SETTINGS.items()]
+    return markdown(["", *(f"`{name}`" for name in PRESETS)], rows)
+
+
+def _setting(config: JobConfig, name: str) -> str:
+    if name in OF_ROUNDS and not config.rounds:
+        return "-"
+    value = getattr(config, name)
+    values = value if isinstance(value, tuple) else (value,)
+    return (
+        ", ".join(f"{each:g}" if isinstance(each, float) else str(each) for each in values if each is not None) or "-"
+    )
+
+
+def described(owner: type) -> dict[str, str]:
+    """What a class's Google docstring says of each name under "Args" or "Attributes", on one line."""
+    text = inspect.cleandoc(owner.__doc__ or "")
+    section = re.search(r"^(?:Args|Attributes):\n((?:(?: .*)?\n?)+)", text, re.MULTILINE)
+    entries: dict[str, str] = {}
+    for names, said in re.findall(r"^ {4}(\w[\w, ]*): (.+(?:\n {8}.+)*)", section[1] if section else "", re.MULTILINE):
+        for name in names.split(", "):
+            entries[name] = " ".join(said.split()).replace("``", "`")
+    return entries
+
+
+TABLES: dict[str, Callable[[], str]] = {
+    function.__name__: function
+    for function in (
+        gaits,
+        commands,
+        actions,
+        default_observation,
+        paper_observation,
+        optional_parts,
+        physics,
+        sensor_noise,
+        rewards,
+        arguments,
+        presets,
+        job_options,
+    )
+}
+"""The tables that a page can ask for."""

@@ -1,0 +1,36 @@
+"""Checks that several trainers make of what they are given."""
+
+import math
+from collections.abc import Mapping
+from numbers import Real
+from typing import Any
+
+import numpy as np
+
+from go1_mtl_gym.errors import InvalidInputError
+
+
+def positive(value: object, name: str) -> float:
+    """Return a finite number above zero as a float.
+
+    Raises:
+        InvalidInputError: if it is something else.
+    """
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real) or not 0 < float(value) < math.inf:
+        raise InvalidInputError(f"{name} must be a finite number > 0, got {value!r}")
+    return float(value)
+
+
+def refuse_overridden(env_kwargs: Mapping[str, Any], **instead: str) -> None:
+    """Refuse arguments of an environment that a function sets itself.
+
+    Args:
+        env_kwargs: what the function was given.
+        instead: name of such an argument -> what to use in its place.
+
+    Raises:
+        InvalidInputError: if one of them was given; it would be overridden in silence otherwise.
+    """
+    for name, other in instead.items():
+        if name in env_kwargs:
+            raise InvalidInputError(f"{name} is set by {other} here, got {name}={env_kwargs[name]!r}")
