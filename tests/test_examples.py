@@ -13,9 +13,9 @@ from types import ModuleType
 
 import pytest
 
-from go1_mtl_gym import PAPER_TASKS
-
 ROOT = Path(__file__).parent.parent
+SMOKE_TASKS = ("bound", "walk")
+"""Half of the gaits, in half of the time."""
 CLOSED_LOOP = {"survival_rate", "survival_s", "velocity_error", "step_rate", "success_rate"}
 ONE_STEP = {"mse", "mae", "r2", "r2_joint_mean"}
 IMPOSSIBLE = {
@@ -175,7 +175,7 @@ def interrupt(process: subprocess.Popen, once: Path) -> str:
 def smoke(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """A smoke run that was interrupted by Ctrl-C, once while collecting and once in a round, and taken up again."""
     out = tmp_path_factory.mktemp("job") / "run"
-    arguments = ("--preset", "smoke", "--n-envs", "2", "--out", str(out))
+    arguments = ("--preset", "smoke", "--tasks", *SMOKE_TASKS, "--n-envs", "2", "--out", str(out))
     output = interrupt(start(*arguments), out / "demonstrations")
     assert f"interrupted; what is done is kept, go on with: --out {out}" in output
     output = interrupt(start(*arguments), out / "parts" / "cloned.zip")
@@ -190,7 +190,7 @@ def smoke(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
 def test_smoke_writes_the_metrics_that_others_read(smoke):
     out, _ = smoke
     metrics = json.loads((out / "metrics.json").read_text())
-    assert list(metrics["tasks"]) == list(PAPER_TASKS)
+    assert list(metrics["tasks"]) == list(SMOKE_TASKS)
     for learners in metrics["tasks"].values():
         assert set(learners["expert"]) >= CLOSED_LOOP
         for name in ("multi_head", "pooled", "paper_literal"):
@@ -205,8 +205,8 @@ def test_smoke_writes_the_metrics_that_others_read(smoke):
 @pytest.mark.slow
 def test_smoke_prints_one_table_per_gait_and_leaves_its_files(smoke):
     out, output = smoke
-    assert all(task in output for task in PAPER_TASKS) and "R2" in output
-    assert output.count("the same without a clock") == len(PAPER_TASKS)
+    assert all(task in output for task in SMOKE_TASKS) and "R2" in output
+    assert output.count("| the same without a clock") == len(SMOKE_TASKS)
     for name in ("policy.zip", "phase_free.zip", "metrics.json"):
         assert f"  {out / name}" in output
     assert f"tensorboard --logdir {out / 'tensorboard'}" in output
@@ -221,7 +221,7 @@ def test_smoke_prints_one_table_per_gait_and_leaves_its_files(smoke):
 @pytest.mark.gl
 def test_smoke_films_every_gait(smoke):
     out, _ = smoke
-    assert all((out / f"{name}.gif").stat().st_size > 10_000 for name in (*PAPER_TASKS, "gaits"))
+    assert all((out / f"{name}.gif").stat().st_size > 10_000 for name in (*SMOKE_TASKS, "gaits"))
 
 
 @pytest.mark.slow
@@ -251,7 +251,7 @@ def test_the_phase_free_policy_is_the_policy_with_an_estimate_of_the_phase(smoke
 def test_a_finished_run_is_not_repeated_and_other_settings_are_refused(smoke):
     out, _ = smoke
     before = (out / "policy.zip").stat().st_mtime_ns, (out / "metrics.json").read_text()
-    process = start("--preset", "smoke", "--n-envs", "2", "--out", str(out), "--seed", "1")
+    process = start("--preset", "smoke", "--tasks", *SMOKE_TASKS, "--out", str(out), "--seed", "1")
     output, _ = process.communicate(timeout=120)
     assert process.returncode == 2 and "other settings (seed)" in output
     assert before == ((out / "policy.zip").stat().st_mtime_ns, (out / "metrics.json").read_text())
