@@ -8,10 +8,8 @@ python examples/quickstart.py --render                              in a window
 import argparse
 from collections.abc import Sequence
 
-import gymnasium as gym
-
-import go1_mtl_gym
 import trainers
+from go1_mtl_gym import TASKS
 from trainers.utils.cli import main
 
 
@@ -20,7 +18,7 @@ def run(arguments: Sequence[str] | None = None) -> None:
     """Make the environment that the policy was trained for, and let it drive."""
     parser = argparse.ArgumentParser(description="Let a policy drive a Go1 and print what it does.")
     parser.add_argument("policy", nargs="?", help="file of a trained policy (default: the one in the package)")
-    parser.add_argument("--task", choices=go1_mtl_gym.TASKS, default="trot", help="gait (default: trot)")
+    parser.add_argument("--task", choices=TASKS, default="trot", help="gait (default: trot)")
     parser.add_argument("--command", nargs=3, type=float, default=(0.5, 0.0, 0.0), metavar=("VX", "VY", "YAW"))
     parser.add_argument("--seconds", type=float, default=5.0, help="of robot time (default: 5)")
     parser.add_argument("--render", action="store_true", help="open a window")
@@ -28,8 +26,7 @@ def run(arguments: Sequence[str] | None = None) -> None:
 
     policy = trainers.load(options.policy) if options.policy else trainers.load_pretrained()
     render_mode = "human" if options.render else None
-    env = gym.make(go1_mtl_gym.env_id(options.task), render_mode=render_mode, **policy.env_kwargs)
-
+    env = policy.make_env(options.task, render_mode=render_mode)
     obs, info = env.reset(seed=0, options={"command": tuple(options.command)})
     state, fallen = None, False
     for _ in range(round(options.seconds * env.unwrapped.control_hz)):

@@ -11,7 +11,7 @@ at a function's own file to tell whether the code is stale.
 import warnings
 from collections.abc import Callable
 from functools import update_wrapper
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from numba import njit
 
@@ -23,14 +23,13 @@ def compiled(function: _Function) -> _Function:
 
     Compiled code cannot call the result: that is what `inlined` is for.
     """
-    guarded: Any = _Guarded(function)
-    return guarded
+    return cast(_Function, _Guarded(function))
 
 
 def inlined(function: _Function) -> _Function:
     """Compile what `compiled` functions of the same file call; it becomes part of their machine code."""
-    helper: _Function = njit(function)
-    return helper
+    helper: Any = njit(function)
+    return cast(_Function, helper)
 
 
 class _Guarded:
@@ -48,7 +47,7 @@ class _Guarded:
         except RuntimeError:  # no place for the cache: "no locator available for file ..."
             self._dispatcher = njit(function)
 
-    def __call__(self, *args: Any) -> Any:
+    def __call__(self, *args: object) -> object:
         """Run the machine code; the first call for new types of arguments loads or compiles it."""
         try:
             return self._dispatcher(*args)

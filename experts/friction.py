@@ -11,8 +11,8 @@ NORMAL_ROW = 4
 def friction_pyramid(mu: float) -> np.ndarray:
     """Rows F of one foot, shape (5, 3), with |f_x| <= mu f_z and |f_y| <= mu f_z where the first four of F f are >= 0.
 
-    The fifth row is f_z, for its own bounds. (The inner linearization of the friction cone; e.g. J. Di Carlo et al.,
-    IROS 2018, equation 24.)
+    The fifth row is f_z, for its own bounds. (The inner linearization of the friction cone, as in J. Di Carlo et al.,
+    IROS 2018.)
 
     Args:
         mu: coefficient of friction.

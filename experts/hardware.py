@@ -13,7 +13,8 @@ def hardware_expert(gains: PDGains | None = None, hold_s: float = 0.002) -> NMPC
     """An expert that plans forces at 100 Hz and solves the whole body at every call; it remembers its plan.
 
     Args:
-        gains, hold_s: as of `NMPCExpert`.
+        gains: of the PD actuators that will track the targets.
+        hold_s: for how long each target is held [s].
     """
     return NMPCExpert(gains, hold_s, NMPCConfig(mpc_hz=MPC_HZ))
 

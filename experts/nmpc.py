@@ -188,7 +188,7 @@ class NMPCExpert:
         forces = self.forces(state, dynamics)
         if state.standing:
             return self._whole_body(dynamics, forces, np.ones(4, bool), np.zeros((4, 3)))
-        velocity_w = self.mean_velocity(state, dynamics)
+        velocity_w = mean_velocity(state, dynamics, self.motion(state))
         ahead_s = swing_middle(state, self.hold_s)
         swing = self.config.swing.acceleration(state, ahead_s, dynamics, velocity_w, self.config.footholds)
         # Where feet touch down or lift off during the hold, one target has to serve both: the mean over time.
@@ -219,7 +219,8 @@ class NMPCExpert:
             dynamics: at the state.
         """
         config = self.config
-        motion, velocity_w = self.motion(state), self.mean_velocity(state, dynamics)
+        motion = self.motion(state)
+        velocity_w = mean_velocity(state, dynamics, motion)
         horizon = pose_horizon(
             state, dynamics, motion, velocity_w, config.footholds, config.com_height, config.mpc.steps
         )
@@ -249,17 +250,23 @@ class NMPCExpert:
                 break
         return states, inputs
 
-    def mean_velocity(self, state: RobotState, dynamics: Dynamics) -> np.ndarray:
-        """Horizontal velocity of the centre of mass without the gait's own sway, world [m/s], shape (2,)."""
-        swaying = self.motion(state).at(np.array([state.phase]))[0, 9:11]
-        mean = to_complex(dynamics.com_velocity_w) - to_complex(swaying) * turn(state.rpy[2])
-        return np.array([mean.real, mean.imag])
-
     def motion(self, state: RobotState) -> NominalMotion:
         """The nominal motion of the state's gait, or of standing."""
         if state.standing:
             return standing_motion(state.gait)
         return nominal_motion(state.gait, self._standing_inertia, self.config.com_height - robot.FOOT_RADIUS)
+
+
+def mean_velocity(state: RobotState, dynamics: Dynamics, motion: NominalMotion) -> np.ndarray:
+    """Horizontal velocity of the centre of mass without the gait's sway, world [m/s], shape (2,).
+
+    Args:
+        state: the robot now.
+        dynamics: at the state.
+        motion: nominal, of the state's gait or of standing.
+    """
+    mean = to_complex(dynamics.com_velocity_w) - motion.sway_velocity(state.phase) * turn(state.rpy[2])
+    return np.array([mean.real, mean.imag])
 
 
 def _is_plausible(state: RobotState) -> bool:

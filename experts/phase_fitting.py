@@ -1,9 +1,9 @@
 """Which phase of its gait a robot is in, told from its motion alone.
 
 A gait's nominal cycle says what everything should look like at each phase. With lambda the phase of a leg in its own
-cycle, T the period, beta the duty, w = (1 - early)(1 - beta) the share of the cycle in which the foot is under way, v
-the mean velocity of the body at the leg (heading frame; measured, less the nominal sway at the phase in question) and x
-the foot's place relative to the point under its hip,
+cycle, T the period, beta the duty, w = (1 - early)(1 - beta) the fraction of the cycle in which the foot is under way,
+v the mean velocity of the body at the leg (heading frame; measured, less the nominal sway at the phase in question) and
+x the foot's place relative to the point under its hip,
 
     (1)  x = v T (beta/2 - k(lambda)) - d,    xdot_world = v (1 - k'(lambda)),
          k = lambda                  in stance: the body passes over the foot, half a stride before it to half behind,
@@ -26,7 +26,7 @@ import numpy as np
 
 from experts.planning.body_reference import COM_HEIGHT
 from experts.planning.nominal_motion import SAMPLES, nominal_motion
-from experts.planning.plane import carried, to_complex, turn
+from experts.planning.plane import carried, to_complex, to_complex_array, turn
 from experts.planning.swing import SwingRule, cubic, hump
 from experts.robot_model import RobotModel, whole_body_attitude
 from go1_mtl_gym import robot
@@ -86,7 +86,7 @@ class _Cycle:
     """The nominal cycle at phases i / SAMPLES; of shape (SAMPLES, 4) unless said otherwise.
 
     Attributes:
-        ground: share of contact.
+        ground: fraction of contact.
         height: of the feet's centres [m].
         climb: [m/s].
         place: beta/2 - k of equation (1), times the period [s].
@@ -149,12 +149,12 @@ def _residuals(
     dynamics = model.dynamics(state)
     vx, vy, yaw_rate = state.command.tolist()
     back = turn(-state.rpy[2])  # from the world to the heading frame
-    arm = to_complex(state.gait.nominal_feet_b)
+    arm = to_complex_array(state.gait.nominal_feet_b)
     com_velocity = to_complex(dynamics.com_velocity_w) * back
     mean = com_velocity - cycle.sway
     velocity = mean[:, None] + carried(arm, yaw_rate)
-    place = to_complex(dynamics.feet_w - dynamics.com_w) * back - arm
-    speed = to_complex(dynamics.feet_velocity_w) * back
+    place = to_complex_array(dynamics.feet_w - dynamics.com_w) * back - arm
+    speed = to_complex_array(dynamics.feet_velocity_w) * back
     turning = to_complex(dynamics.mean_omega_w) * back
     rate = np.array([turning.real, turning.imag, dynamics.mean_omega_w[2] - yaw_rate])
     columns = (
@@ -194,13 +194,13 @@ def _cycle(gait: Gait, swing: SwingRule, com_height: float) -> _Cycle:
     motion = nominal_motion(gait, _standing_inertia(), com_height - robot.FOOT_RADIUS)
     touchdown = motion.at((phase[:, None] - leg).ravel())[:, 3:5].reshape(SAMPLES, 4, 2)
     return _Cycle(
-        ground=_contact_share(leg, duty, 1 - duty - landed * under_way),
+        ground=_contact_fraction(leg, duty, 1 - duty - landed * under_way),
         height=robot.FOOT_RADIUS + np.where(above, arc, 0.0),
         climb=np.where(above, rise / (under_way * period), 0.0),
         place=period * (duty / 2 - np.where(stance, leg, left - (1 - leg))) - TRAIL_S,
         speed=-slope / under_way,
-        drawn=np.where(stance, to_complex(motion.position[:, None, 3:5]) - to_complex(touchdown), 0.0),
-        sway=to_complex(motion.velocity[:, 3:5]),
+        drawn=np.where(stance, to_complex_array(motion.position[:, None, 3:5]) - to_complex_array(touchdown), 0.0),
+        sway=to_complex_array(motion.velocity[:, 3:5]),
         tilt=motion.position[:, :2],
         rate=motion.velocity[:, :3],
         level=motion.position[:, 5],
@@ -208,13 +208,13 @@ def _cycle(gait: Gait, swing: SwingRule, com_height: float) -> _Cycle:
     )
 
 
-def _contact_share(leg: np.ndarray, duty: float, waiting: float) -> np.ndarray:
-    """1 on the ground, 0 in the air, with ramps; the foot is down a share `waiting` of the cycle before its stance."""
+def _contact_fraction(leg: np.ndarray, duty: float, waiting: float) -> np.ndarray:
+    """1 on the ground, 0 in the air, with ramps; the foot is down for `waiting` cycles before its stance begins."""
     since = np.mod(leg + waiting, 1.0)
     length = duty + waiting
-    centred = np.abs(since - length / 2)
-    centred = np.minimum(centred, 1.0 - centred)
-    return np.clip(0.5 + (length / 2 - centred) / (2 * _BLUR), 0.0, 1.0)
+    centered = np.abs(since - length / 2)
+    centered = np.minimum(centered, 1.0 - centered)
+    return np.clip(0.5 + (length / 2 - centered) / (2 * _BLUR), 0.0, 1.0)
 
 
 @lru_cache(maxsize=1)

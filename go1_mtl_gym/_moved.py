@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
 from types import MappingProxyType, ModuleType
-from typing import Any
 
 from go1_mtl_gym.deprecation import warn_renamed
 
@@ -52,8 +51,8 @@ class MovedModules(MetaPathFinder, Loader):
         )
 
 
-def _forward(old: str, new: str) -> Callable[[str], Any]:
-    def look_up(name: str) -> Any:
+def _forward(old: str, new: str) -> Callable[[str], object]:
+    def look_up(name: str) -> object:
         if name.startswith("__"):  # the import system asks for these
             raise AttributeError(f"module {old} has no attribute {name}")
         target = RENAMED.get(name, name)

@@ -69,6 +69,7 @@ class PolicyContract:
     version: int = CONTRACT_VERSION
 
     def __post_init__(self) -> None:
+        """Check the sizes, and bring everything into one form."""
         for name in ("tasks", "gaits", "terms", "joints"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
         for name in ("default_q", "action_scale"):
@@ -195,7 +196,8 @@ class PolicyContract:
 
         Args:
             other: the contract of the other side.
-            self_name, other_name: what the two are called in the message, such as "the policy" and "the rows".
+            self_name: what this one is called in the message, such as "the policy".
+            other_name: what the other one is called, such as "the rows".
             ignore: names of fields that may differ.
 
         Raises:
@@ -252,14 +254,14 @@ def _shared_gaits(first: PolicyContract, second: PolicyContract) -> tuple[dict[s
     return {name: known[0][name] for name in both}, {name: known[1][name] for name in both}
 
 
-def _same(first: Any, second: Any) -> bool:
-    numbers = isinstance(first, tuple) and all(isinstance(value, float) for value in first)
-    if numbers and isinstance(second, tuple) and len(first) == len(second):
-        return bool(np.allclose(first, second, rtol=0.0, atol=_TOLERANCE))
+def _same(first: object, second: object) -> bool:
+    both = isinstance(first, tuple) and isinstance(second, tuple) and len(first) == len(second)
+    if both and all(isinstance(value, float) for value in (*first, *second)):  # type: ignore[misc]
+        return bool(np.allclose(first, second, rtol=0.0, atol=_TOLERANCE))  # type: ignore[arg-type]
     return bool(first == second)
 
 
-def _short(value: Any) -> str:
+def _short(value: object) -> str:
     """A value as a message can show it."""
     if isinstance(value, tuple) and value and isinstance(value[0], ObservationTerm):
         return "[" + ", ".join(f"{term.name} {term.size}" for term in value) + "]"

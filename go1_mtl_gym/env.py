@@ -2,18 +2,20 @@
 
 import copy
 from collections import deque
-from collections.abc import Sequence
+from numbers import Integral
 from typing import Any
 
 import gymnasium
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.error import ResetNeeded
 from gymnasium.spaces import Box
+from numpy.typing import ArrayLike
 
 from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PHYSICS_HZ, ActionMap
 from go1_mtl_gym.contract import PolicyContract
-from go1_mtl_gym.deprecation import warn_renamed
+from go1_mtl_gym.deprecation import renamed_attribute
 from go1_mtl_gym.env_config import RENDER_MODES, EnvConfig
 from go1_mtl_gym.episode import Episode, draw_conditions, how_it_ended
 from go1_mtl_gym.errors import InvalidInputError
@@ -39,7 +41,7 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
 
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 50}
 
-    def __init__(self, task: EnvConfig | str | None = "trot", **arguments: Any) -> None:
+    def __init__(self, task: EnvConfig | str | None = "trot", **arguments: object) -> None:
         """Make the environment; see the class."""
         if isinstance(task, EnvConfig) and arguments:
             raise InvalidInputError(f"an EnvConfig says everything; beside it came {', '.join(arguments)}")
@@ -47,6 +49,7 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def _build(self, config: EnvConfig) -> None:
         self.config = config
+        self.metadata = type(self).metadata | {"render_fps": config.control_hz}  # whoever records reads it here
         self.tasks = config.tasks
         self.control_hz, self.control_s = config.control_hz, config.control_s
         self.gains = config.gains
@@ -55,12 +58,27 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
         self.observation_space = Box(self.layout.low, self.layout.high, dtype=np.float32)
         self.action_space = Box(-1.0, 1.0, (12,), dtype=np.float32)
         self.render_mode = config.render_mode
+        self._spec: EnvSpec | None = None
         self._simulation = Simulation(self.gains, config.physics)
         self._episode: Episode | None = None
         self._expert: Expert | None = None
         self._renderer: Any = None
 
     # -- Gymnasium ---------------------------------------------------------------------------------------------------
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """What `gymnasium.make` made the environment from, and as its `max_episode_steps` the steps of an episode.
+
+        The environment truncates its episodes itself, after `episode_s`; so the registered ids bring no time limit.
+        """
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = copy.copy(spec)
+        if self._spec is not None:
+            self._spec.max_episode_steps = self.config.episode_steps
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -76,7 +94,7 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
             InvalidInputError: for an unknown option, task or impossible command; the running episode is left as it is.
         """
         name, command = check_reset_options(options, self.tasks, self.config.task)
-        super().reset(seed=seed)
+        super().reset(seed=int(seed) if isinstance(seed, Integral) else seed)
         task = TASKS[name or str(self.np_random.choice(self.tasks))]
         drawn = task.draw_command(self.np_random)
         joint_noise = self.np_random.uniform(-RESET_JOINT_NOISE, RESET_JOINT_NOISE, 12)
@@ -142,7 +160,7 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
             from go1_mtl_gym import rendering
 
             kind = rendering.Viewer if self.render_mode == "human" else rendering.Camera
-            self._renderer = kind(self._simulation, self.config.width, self.config.height)
+            self._renderer = kind(self._simulation, self.config.width, self.config.height, self.control_hz)
         return self._renderer.draw(self.state)
 
     def close(self) -> None:
@@ -179,11 +197,7 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
         """What is different about the physics now."""
         return self._simulation.physics_params
 
-    @property
-    def realism(self) -> PhysicsParams:
-        """The old name of `physics_params`."""
-        warn_renamed("Go1Env.realism", "Go1Env.physics_params")
-        return self.physics_params
+    realism = renamed_attribute("Go1Env.realism", "physics_params")
 
     @property
     def simulation(self) -> Simulation:
@@ -230,7 +244,7 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
         new.check_command(episode.command)
         episode.change_task(new, None if phase is None else check_phase(phase))
 
-    def set_command(self, command: Sequence[float]) -> None:
+    def set_command(self, command: ArrayLike) -> None:
         """Ask for another (vx [m/s], vy [m/s], yaw rate [rad/s]); it is low-passed before expert and student see it.
 
         Raises:
@@ -239,7 +253,7 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
         episode = self._running("set_command")
         episode.change_command(episode.requested_task.check_command(command))
 
-    def push(self, delta_velocity_w: Sequence[float]) -> None:
+    def push(self, delta_velocity_w: ArrayLike) -> None:
         """Push the trunk: add to its linear velocity [m/s], world frame, shape (3,).
 
         Raises:
@@ -262,6 +276,8 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
             "config": self.config,
             "episode": copy.deepcopy(self._episode),
             "snapshot": self._simulation.snapshot(),
+            "spec": self.spec,
+            "spaces": copy.deepcopy((self.observation_space, self.action_space)),  # with their generators
             "np_random": copy.deepcopy(self._np_random),
             "np_random_seed": getattr(self, "_np_random_seed", None),
         }
@@ -272,6 +288,8 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
             register_task(task)
         self._build(state["config"])
         self._simulation.restore(state["snapshot"])
+        self.spec = state["spec"]
+        self.observation_space, self.action_space = state["spaces"]
         self._np_random = state["np_random"]
         self._np_random_seed = state["np_random_seed"]
         self._episode = state["episode"]

@@ -13,7 +13,7 @@ from go1_mtl_gym.sensing.state_noise import EstimatorNoise
 from go1_mtl_gym.sim.domain_randomization import DomainRandomization
 from go1_mtl_gym.sim.physics_params import PhysicsParams
 from go1_mtl_gym.tasks import TASKS, check_task_names
-from go1_mtl_gym.validation import integer_in, number_in, one_of, switch
+from go1_mtl_gym.validation import integer_in, number_in, one_of, parameters_of, switch
 
 RENDER_MODES = ("human", "rgb_array")
 PIXELS = (16, 4096)
@@ -43,7 +43,7 @@ class EnvConfig:
         control_hz: rate of `step` [Hz]; a divisor of 1000 from 50 to 1000.
         kp: stiffness of the actuators [N m/rad].
         kd: their damping [N m s/rad].
-        noise: of the sensors; True is the default one, None and False are exact sensors.
+        noise: of the sensors; True is the default one, None and False are exact sensors, a dictionary holds its fields.
         estimator_noise: on the state that the expert sees; likewise.
         state_estimator: that tells the expert the state from the sensors; likewise, and not with `estimator_noise`.
         randomization: of physics and sensor noise at every reset; likewise.
@@ -95,16 +95,15 @@ class EnvConfig:
             render_mode=None if self.render_mode is None else one_of(self.render_mode, RENDER_MODES, "render_mode"),
             width=integer_in(self.width, *PIXELS, "width [pixels]"),
             height=integer_in(self.height, *PIXELS, "height [pixels]"),
+            physics=parameters_of(self.physics, PhysicsParams, "physics"),
         )
         self._check_together()
 
-    def _set(self, **values: Any) -> None:
+    def _set(self, **values: object) -> None:
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
     def _check_together(self) -> None:
-        if not isinstance(self.physics, PhysicsParams):
-            raise InvalidInputError(f"physics must be PhysicsParams, got {self.physics!r}")
         if self.estimator_noise is not None and self.state_estimator is not None:
             raise InvalidInputError(
                 "estimator_noise stands for the errors of an estimator and state_estimator has its own: give one of "
@@ -146,7 +145,7 @@ class EnvConfig:
     # -- Its other forms -----------------------------------------------------------------------------------------------
 
     @classmethod
-    def from_arguments(cls, **arguments: Any) -> "EnvConfig":
+    def from_arguments(cls, **arguments: object) -> "EnvConfig":
         """The configuration that belongs to keyword arguments of `go1_mtl_gym.Go1Env`.
 
         Args:
@@ -158,10 +157,11 @@ class EnvConfig:
         names, figures = _names(cls), _names(PhysicsParams)
         for name in arguments:
             one_of(name, (*names, *figures), "argument of Go1Env")
-        given = {name: value for name, value in arguments.items() if name in names}
-        changed = {name: value for name, value in arguments.items() if name in figures}
+        given: dict[str, Any] = {name: value for name, value in arguments.items() if name in names}
+        changed: dict[str, Any] = {name: value for name, value in arguments.items() if name in figures}
         if changed:
-            given["physics"] = replace(given.get("physics", PhysicsParams()), **changed)
+            base = parameters_of(given.get("physics", PhysicsParams()), PhysicsParams, "physics")
+            given["physics"] = replace(base, **changed)
         return cls(**given)
 
     def as_arguments(self) -> dict[str, Any]:
@@ -188,15 +188,9 @@ class EnvConfig:
         Raises:
             InvalidInputError: if something in it is unknown or not as described.
         """
-        given = dict(values)
-        for name, kind in (*_SWITCHES.items(), ("physics", PhysicsParams)):
-            if isinstance(given.get(name), Mapping):
-                for part in given[name]:
-                    one_of(part, _names(kind), f"field of {name}")
-                given[name] = kind(**given[name])
-        for name in given:
+        for name in values:
             one_of(name, _names(cls), "field of an environment's configuration")
-        return cls(**given)
+        return cls(**values)
 
 
 def check_control_hz(control_hz: object) -> int:
@@ -215,8 +209,8 @@ def _names(kind: type) -> tuple[str, ...]:
     return tuple(each.name for each in fields(kind))
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> object:
     """A value of a configuration as JSON has it."""
-    if is_dataclass(value):
+    if is_dataclass(value) and not isinstance(value, type):
         return {each.name: _plain(getattr(value, each.name)) for each in fields(value)}
     return list(value) if isinstance(value, tuple) else value

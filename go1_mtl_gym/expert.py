@@ -13,8 +13,6 @@ from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.sensing.state import RobotState
 
 DEFAULT_EXPERT = "experts.nmpc:NMPCExpert"
-_SAME_S = 1e-9
-"""Control periods that differ by less are one [s]."""
 
 
 class Expert(Protocol):
@@ -79,10 +77,10 @@ def make_expert(expert: str | Callable[..., Expert], gains: PDGains, hold_s: flo
     Args:
         expert: what `check_expert` returned.
         gains: of the environment's actuators.
-        hold_s: for how long it holds a joint target [s].
+        hold_s: time for which the environment holds an action [s].
 
     Raises:
-        InvalidInputError: if the expert was made for others.
+        InvalidInputError: if the expert is made for another environment.
     """
     made = load_expert(expert)(gains=gains, hold_s=hold_s)
     check_expert_fits(made, gains, hold_s)
@@ -93,17 +91,16 @@ def check_expert_fits(expert: object, gains: PDGains, hold_s: float) -> None:
     """Refuse an expert that was made for another environment.
 
     Args:
-        expert: compared by its attributes `gains` and `hold_s`, where it has them.
+        expert: compared by its attributes `gains` and `hold_s`, where it has them as `PDGains` and as a number.
         gains: of the environment's actuators.
-        hold_s: for how long the environment holds a joint target [s].
+        hold_s: time for which the environment holds an action [s].
 
     Raises:
         InvalidInputError: if one of them differs; names both sides.
     """
-    its_gains, its_hold = getattr(expert, "gains", None), getattr(expert, "hold_s", None)
-    if isinstance(its_gains, PDGains) and its_gains != gains:
-        raise InvalidInputError(f"the expert answers for {its_gains}, the environment has {gains}")
-    if isinstance(its_hold, Real) and abs(float(its_hold) - hold_s) > _SAME_S:
-        raise InvalidInputError(
-            f"the expert holds its targets for {float(its_hold):g} s, the environment for {hold_s:g} s"
-        )
+    for name, value, kind in (("gains", gains, PDGains), ("hold_s", hold_s, Real)):
+        expected = getattr(expert, name, None)
+        if isinstance(expected, kind) and expected != value:
+            raise InvalidInputError(
+                f"the expert was made for {name} {expected}, the environment has {value}: make one with both alike"
+            )

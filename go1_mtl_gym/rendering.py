@@ -4,6 +4,9 @@ import ctypes.util
 import importlib
 import os
 import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
 
 import mujoco
 import numpy as np
@@ -76,12 +79,14 @@ def annotate(scene: mujoco.MjvScene, simulation: Simulation, state: RobotState) 
         tip = above + np.append(turn @ velocity[:2] * ARROW_S, lift)
         start = above + [0.0, 0.0, lift]
         if np.linalg.norm(tip - start) > 0.02:
-            geom = _add(scene, mujoco.mjtGeom.mjGEOM_ARROW, np.zeros(3), np.zeros(3), color)
+            geom = _add(scene, mujoco.mjtGeom.mjGEOM_ARROW, [0.0] * 3, [0.0] * 3, color)
             if geom is not None:
                 mujoco.mjv_connector(geom, mujoco.mjtGeom.mjGEOM_ARROW, 0.012, start, tip)
 
 
-def _add(scene: mujoco.MjvScene, kind: int, size: list, position: list, color: tuple) -> mujoco.MjvGeom | None:
+def _add(
+    scene: mujoco.MjvScene, kind: int, size: Sequence[float], position: Sequence[float], color: Sequence[float]
+) -> mujoco.MjvGeom | None:
     if scene.ngeom >= scene.maxgeom:
         return None
     geom = scene.geoms[scene.ngeom]
@@ -93,16 +98,24 @@ def _add(scene: mujoco.MjvScene, kind: int, size: list, position: list, color: t
 class Camera:
     """Off-screen pictures from the tracking camera.
 
+    An OpenGL context belongs to the thread that made it: the first picture decides which thread draws them all.
+
     Args:
-        simulation: what to look at.
-        width, height: of the picture [pixels].
+        simulation: what to look at; the off-screen buffer of its model is made large enough.
+        width: of the picture [pixels].
+        height: of the picture [pixels].
+        fps: not used; whoever plays the pictures decides.
 
     Raises:
         RenderingError: if no OpenGL context can be had.
     """
 
-    def __init__(self, simulation: Simulation, width: int, height: int) -> None:
+    def __init__(self, simulation: Simulation, width: int, height: int, fps: float) -> None:
+        """Open an OpenGL context."""
         self._simulation = simulation
+        self._thread = threading.get_ident()
+        buffer = simulation.model.vis.global_
+        buffer.offwidth, buffer.offheight = max(buffer.offwidth, width), max(buffer.offheight, height)
         try:
             choose_backend()
             self._renderer = mujoco.Renderer(simulation.model, height, width)
@@ -112,14 +125,58 @@ class Camera:
             ) from error
 
     def draw(self, state: RobotState) -> np.ndarray:
-        """RGB array, uint8, shape (height, width, 3)."""
+        """RGB array, uint8, shape (height, width, 3).
+
+        Raises:
+            RenderingError: in another thread than that of the first picture.
+        """
+        self._check_thread("draw")
         self._renderer.update_scene(self._simulation.data, camera=CAMERA)
         annotate(self._renderer.scene, self._simulation, state)
         return self._renderer.render()
 
     def close(self) -> None:
-        """Free the OpenGL context."""
+        """Free the OpenGL context.
+
+        Raises:
+            RenderingError: in another thread than that of the first picture.
+        """
+        self._check_thread("close")
         self._renderer.close()
+
+    def _check_thread(self, action: str) -> None:
+        if threading.get_ident() != self._thread:
+            raise RenderingError(
+                f"cannot {action} in the thread {threading.current_thread().name!r}: the OpenGL context belongs to the "
+                "thread that drew the first picture; draw and close there, or give each thread its own environment"
+            )
+
+
+class Pace:
+    """Lets things happen at most so often.
+
+    Args:
+        hz: how often per second.
+        clock: the time [s].
+        sleep: lets seconds pass.
+    """
+
+    def __init__(
+        self,
+        hz: float,
+        clock: Callable[[], float] = time.perf_counter,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        """Begin now."""
+        self._period, self._clock, self._sleep = 1.0 / hz, clock, sleep
+        self._due = clock()
+
+    def wait(self) -> None:
+        """Let the rest of the period pass; one that took too long is not made up for."""
+        now = self._clock()
+        self._due = max(self._due + self._period, now)
+        if self._due > now:
+            self._sleep(self._due - now)
 
 
 class Viewer:
@@ -127,13 +184,16 @@ class Viewer:
 
     Args:
         simulation: what to look at.
-        width, height: not used; the window can be resized.
+        width: not used; the window can be resized.
+        height: not used, likewise.
+        fps: how many states are shown per second; a faster simulation waits.
 
     Raises:
         RenderingError: if no window can be opened.
     """
 
-    def __init__(self, simulation: Simulation, width: int, height: int) -> None:
+    def __init__(self, simulation: Simulation, width: int, height: int, fps: float) -> None:
+        """Open the window."""
         # without a display GLFW ends the whole process instead of raising
         if sys.platform.startswith("linux") and not has_display():
             raise RenderingError('cannot open a window: there is no display; use render_mode="rgb_array"')
@@ -146,6 +206,7 @@ class Viewer:
             )
         except Exception as error:  # GLFW and MuJoCo raise different types
             raise RenderingError(f'cannot open a window: {error}; use render_mode="rgb_array"') from error
+        self._pace = Pace(fps)
         self._window.cam.type = mujoco.mjtCamera.mjCAMERA_FIXED
         self._window.cam.fixedcamid = simulation.model.camera(CAMERA).id
 
@@ -155,6 +216,7 @@ class Viewer:
             self._window.user_scn.ngeom = 0
             annotate(self._window.user_scn, self._simulation, state)
         self._window.sync()
+        self._pace.wait()
 
     def close(self) -> None:
         """Close the window."""

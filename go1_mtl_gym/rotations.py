@@ -16,22 +16,12 @@ def matrix_from_quat(quat_wxyz: np.ndarray) -> np.ndarray:
 
 
 def quat_from_matrix(rotation: np.ndarray) -> np.ndarray:
-    """The unit quaternion of a rotation matrix, shape (4,).
+    """The unit quaternion of a rotation matrix, shape (4,)."""
+    import mujoco  # here alone, so that everything else about rotations can be had without it
 
-    4 q q^T follows from R linearly; its column with the largest diagonal entry is divided, so that no small number is
-    (S. W. Shepperd, "Quaternion from rotation matrix", 1978). The largest component is positive.
-    """
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation
-    products = np.array(
-        [
-            [1 + xx + yy + zz, zy - yz, xz - zx, yx - xy],
-            [zy - yz, 1 + xx - yy - zz, xy + yx, xz + zx],
-            [xz - zx, xy + yx, 1 - xx + yy - zz, yz + zy],
-            [yx - xy, xz + zx, yz + zy, 1 - xx - yy + zz],
-        ]
-    )
-    quat = products[np.argmax(np.diagonal(products))]
-    return quat / np.linalg.norm(quat)
+    quat = np.empty(4)
+    mujoco.mju_mat2Quat(quat, rotation.ravel())
+    return quat
 
 
 def rpy_from_quat(quat_wxyz: np.ndarray) -> np.ndarray:

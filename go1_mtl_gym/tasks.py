@@ -36,6 +36,7 @@ class Task:
     reward: RewardWeights = field(default_factory=RewardWeights)
 
     def __post_init__(self) -> None:
+        """Check everything, and make tuples of what came."""
         if not isinstance(self.gait, Gait):
             raise InvalidInputError(f"gait of task {self.name!r} must be a Gait, got {self.gait!r}")
         span = finite_vector(self.command_range, 3, f"command_range of task {self.name!r}")

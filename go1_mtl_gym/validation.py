@@ -3,11 +3,16 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from numbers import Real
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
 from go1_mtl_gym.errors import InvalidInputError
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+Parameters = TypeVar("Parameters")
 
 _NUMBER_KINDS = "iufO"
 """Kinds of numpy arrays that hold numbers, or things that may be numbers; not booleans, text or complex numbers."""
@@ -91,13 +96,16 @@ class Limits(NamedTuple):
     unit: str = ""
 
 
-def check_numbers(parameters: Any, limits: Limits | Mapping[str, Limits], prefix: str = "", suffix: str = "") -> None:
+def check_numbers(
+    parameters: "DataclassInstance", limits: Limits | Mapping[str, Limits], prefix: str = "", suffix: str = ""
+) -> None:
     """Check numbers of a frozen dataclass, and make them floats, equal to what comes back from a file.
 
     Args:
         parameters: the dataclass, while it is made. A field whose default is None may be None.
         limits: of all fields, or of some by name.
-        prefix, suffix: how the message names the dataclass, before and after the field's name.
+        prefix: how the message names the dataclass, before the field's name.
+        suffix: likewise, after it.
 
     Raises:
         InvalidInputError: if a number is none, or outside its limits.
@@ -121,23 +129,39 @@ def one_of(value: object, allowed: Sequence[str], what: str) -> str:
     return str(value)
 
 
-def switch(value: object, kind: type, what: str) -> Any:
+def switch(value: object, kind: type[Parameters], what: str) -> Parameters | None:
     """Return parameters that can be switched on: True gives the defaults of their kind; None and False give None.
 
-    A mapping gives the kind's fields by name, as a file of JSON holds them.
+    Args:
+        value: what a user gave; a dictionary holds fields, as JSON has them.
+        kind: a dataclass of parameters.
+        what: how messages name it.
 
     Raises:
         InvalidInputError: if it is something else.
     """
     if value is None or value is False:
         return None
-    if value is True:
-        return kind()
+    return kind() if value is True else parameters_of(value, kind, what, "None, True, False or ")
+
+
+def parameters_of(value: object, kind: type[Parameters], what: str, others: str = "") -> Parameters:
+    """Return parameters of a kind, made from a dictionary of their fields if need be.
+
+    Args:
+        value: what a user gave.
+        kind: a dataclass of parameters.
+        what: how messages name it.
+        others: what else messages say it may be.
+
+    Raises:
+        InvalidInputError: if it is something else.
+    """
     if isinstance(value, Mapping):
         for name in value:
-            one_of(name, tuple(each.name for each in fields(kind)), f"field of {what}")
+            one_of(name, tuple(each.name for each in fields(kind)), f"field of {what}")  # type: ignore[arg-type]
         return kind(**value)
     if not isinstance(value, kind):
         article = "an" if kind.__name__[0] in "AEIOU" else "a"
-        raise InvalidInputError(f"{what} must be None, True, False or {article} {kind.__name__}, got {value!r}")
+        raise InvalidInputError(f"{what} must be {others}{article} {kind.__name__}, got {value!r}")
     return value

@@ -1,10 +1,12 @@
 """What makes demonstrations worth learning from: noise on actions, pushes, and commands and tasks that change."""
 
-from typing import Any
+from typing import Any, cast
 
 import gymnasium
 import numpy as np
 
+from go1_mtl_gym.deprecation import renamed_arguments
+from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.tasks import TASKS, Task
 from go1_mtl_gym.validation import finite_vector, interval_s, number_in
@@ -13,6 +15,7 @@ NOISE_CORRELATION_S = 0.1
 """Correlation time of the action noise [s]."""
 
 
+@renamed_arguments(kick="push", kick_interval="push_interval", corner_share="corner_fraction")
 class PerturbationWrapper(gymnasium.Wrapper):
     """Disturbs a Go1 so that its expert is seen recovering.
 
@@ -48,6 +51,7 @@ class PerturbationWrapper(gymnasium.Wrapper):
         corner_fraction: float = 0.0,
         task_interval: tuple[float, float] | None = None,
     ) -> None:
+        """Wrap an environment; see the class."""
         super().__init__(env)
         self._noise_rad = number_in(noise_rad, 0.0, 1.0, "noise_rad [rad]")
         self._push_speed = number_in(push, 0.0, 5.0, "push [m/s]")
@@ -55,16 +59,22 @@ class PerturbationWrapper(gymnasium.Wrapper):
         self._command_interval = interval_s(command_interval, "command_interval")
         self._corner_fraction = number_in(corner_fraction, 0.0, 1.0, "corner_fraction")
         self._task_interval = interval_s(task_interval, "task_interval")
-        if task_interval is not None and len(env.unwrapped.tasks) < 2:
+        if task_interval is not None and len(self._go1.tasks) < 2:
             raise InvalidInputError(f"task_interval must be None for an environment of one task, got {task_interval}")
         self._rng = np.random.default_rng()
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[np.ndarray, dict]:
+    @property
+    def _go1(self) -> Go1Env:
+        return cast(Go1Env, self.env.unwrapped)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
         """Reset the environment; a seed also seeds the disturbances."""
+        result = self.env.reset(seed=seed, options=options)
         if seed is not None:
             self._rng = np.random.default_rng([seed, 0x9E3779B9])
-        result = self.env.reset(seed=seed, options=options)
-        self._sigma = self._rng.uniform(0.0, self._noise_rad) / self.env.unwrapped.action_map.half_range
+        self._sigma = self._rng.uniform(0.0, self._noise_rad) / self._go1.action_map.half_range
         self._noise = self._sigma * self._rng.standard_normal(12)
         self._next_push = self._rng.exponential(self._push_interval)
         self._next_command = self._draw_time(self._command_interval)
@@ -72,13 +82,13 @@ class PerturbationWrapper(gymnasium.Wrapper):
         self._time = 0.0
         return result
 
-    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict]:
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Disturb, then step; ``info["executed_action"]`` is the action with its noise.
 
         Raises:
             InvalidInputError: if the action is not 12 finite numbers; nothing is disturbed or stepped.
         """
-        env = self.env.unwrapped
+        env = self._go1
         action = finite_vector(action, 12, "action")
         keep = np.exp(-env.control_s / NOISE_CORRELATION_S)
         self._noise = keep * self._noise + np.sqrt(1 - keep**2) * self._sigma * self._rng.standard_normal(12)
@@ -95,11 +105,11 @@ class PerturbationWrapper(gymnasium.Wrapper):
             env.set_command(self._draw_command(env.requested_task))
         executed = np.clip(action + self._noise, -1.0, 1.0).astype(np.float32)
         observation, reward, terminated, truncated, info = self.env.step(executed)
-        return observation, reward, terminated, truncated, info | {"executed_action": executed}
+        return observation, float(reward), terminated, truncated, info | {"executed_action": executed}
 
     def _change_task(self) -> None:
         """Ask for another task than the one that was asked for last."""
-        env = self.env.unwrapped
+        env = self._go1
         name = str(self._rng.choice([name for name in env.tasks if name != env.requested_task.name]))
         span = np.array(TASKS[name].command_range)
         env.set_command(np.clip(env.command, -span, span))

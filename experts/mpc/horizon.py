@@ -1,6 +1,6 @@
 """One problem of the MPC from a state: reference, contacts, feet and nominal forces over one gait cycle."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -9,14 +9,13 @@ from experts.mpc.warm_start import Frame
 from experts.planning.body_reference import body_reference
 from experts.planning.footholds import FootholdRule
 from experts.planning.nominal_motion import NominalMotion
-from experts.planning.plane import to_complex, turn
+from experts.planning.plane import to_complex_array, turn
 from experts.robot_model import Dynamics, whole_body_attitude
 from go1_mtl_gym import robot
 from go1_mtl_gym.sensing.state import RobotState
 
 
-@dataclass(frozen=True)
-class Horizon:
+class Horizon(NamedTuple):
     """What the rigid body starts from, is to follow, and pushes with; everything in `frame`.
 
     Attributes:
@@ -84,6 +83,6 @@ def pose_horizon(
 def _nominal_inputs(motion: NominalMotion, phase: np.ndarray, reference: np.ndarray) -> np.ndarray:
     """The nominal motion's forces at phases of the intervals, turned with the reference's yaw, shape (N, 12)."""
     nominal = motion.force_at(phase) * (robot.MASS * robot.GRAVITY / FORCE_UNIT)
-    sideways = to_complex(nominal) * turn(reference[:-1, 2:3])
+    sideways = to_complex_array(nominal) * turn(reference[:-1, 2:3])
     nominal[..., 0], nominal[..., 1] = sideways.real, sideways.imag
     return nominal.reshape(len(phase), 12)

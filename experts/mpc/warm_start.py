@@ -79,8 +79,8 @@ class Trajectory:
         steps = len(self.inputs)
         where = (time_s - self.time_s) / self.dt + np.arange(steps + 1)
         low = np.clip(where.astype(int), 0, steps - 1)
-        share = (where - low)[:, None]
-        states = frame.states((1 - share) * self.states[low] + share * self.states[low + 1], self.frame)
+        fraction = (where - low)[:, None]
+        states = frame.states((1 - fraction) * self.states[low] + fraction * self.states[low + 1], self.frame)
         beyond = where > steps + 1e-9
         states[beyond] = reference[beyond]
         middle = (where[:-1] + 0.5).astype(int)

@@ -39,7 +39,7 @@ class FootholdRule:
         Args:
             state: the robot now.
             com_w: its centre of mass, world [m], shape (3,).
-            velocity_w: its horizontal velocity without the gait's own sway, world [m/s], shape (2,).
+            velocity_w: its horizontal velocity without the gait's sway, world [m/s], shape (2,).
             touchdown_s: time until each touchdown [s], shape (..., 4).
 
         Returns:
@@ -64,7 +64,9 @@ class FootholdRule:
         Feet on the ground now stay where they are until they lift off; later stances stand on planned footholds.
 
         Args:
-            state, com_w, velocity_w: as in `plan`.
+            state: the robot now.
+            com_w: its centre of mass, world [m], shape (3,).
+            velocity_w: as in `plan` [m/s], shape (2,).
             feet_w: centres of the feet now, world [m], shape (4, 3).
             middle: the clock in the middle of each interval, not wrapped [cycles], shape (N,).
 

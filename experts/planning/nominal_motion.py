@@ -17,7 +17,7 @@ from go1_mtl_gym.gaits import Gait
 SAMPLES = 96
 """Grid points per cycle."""
 SWAY = 0.3
-"""Largest nominal horizontal force, as a share of the vertical one."""
+"""Largest nominal horizontal force, as a fraction of the vertical one."""
 _MOMENT_WEIGHT = 20.0  # levelness against evenness of the load when sharing it between the feet
 
 
@@ -42,6 +42,14 @@ class NominalMotion:
         samples, slopes = self._table
         return samples[low] + (where - low)[:, None] * slopes[low]
 
+    def sway_velocity(self, phase: float) -> complex:
+        """Horizontal velocity at one phase [cycles], heading frame, x + iy [m/s]; as `at` says, without its arrays."""
+        where = phase % 1.0 * SAMPLES
+        low = int(where)
+        samples, slopes = self._table
+        x, y = samples[low, 9:11] + (where - low) * slopes[low, 9:11]
+        return complex(x, y)
+
     def force_at(self, phase: np.ndarray) -> np.ndarray:
         """Forces in units of the weight at phases [cycles], shape (len(phase), 4, 3); the sample below."""
         return self.force[(np.mod(phase, 1.0) * SAMPLES).astype(int) % SAMPLES]
@@ -54,7 +62,7 @@ class NominalMotion:
         return samples[:-1], np.diff(samples, axis=0)
 
 
-def _share_load(stance: np.ndarray, feet_b: np.ndarray, total: float) -> np.ndarray:
+def _distribute_load(stance: np.ndarray, feet_b: np.ndarray, total: float) -> np.ndarray:
     """Non-negative loads of the feet on the ground that add up to `total`, nearly level and nearly even."""
     arm = feet_b[stance, :2] / 0.1
     count = int(stance.sum())
@@ -93,16 +101,16 @@ def nominal_motion(gait: Gait, inertia: tuple[float, float, float], height: floa
     supported = stance.any(axis=1)
     load = np.zeros((SAMPLES, 4))
     for i in np.flatnonzero(supported):
-        load[i] = _share_load(stance[i], gait.nominal_feet_b, SAMPLES / supported.sum())
+        load[i] = _distribute_load(stance[i], gait.nominal_feet_b, SAMPLES / supported.sum())
     total = load.sum(axis=1, keepdims=True)
     lever = load @ gait.nominal_feet_b[:, :2]
     horizontal = np.clip(-lever / height, -SWAY * total, SWAY * total)
-    centre = lever / np.maximum(total, 1e-9)
+    center = lever / np.maximum(total, 1e-9)
     moment = np.column_stack(
         [
             lever[:, 1] + height * horizontal[:, 1],
             -lever[:, 0] - height * horizontal[:, 0],
-            centre[:, 0] * horizontal[:, 1] - centre[:, 1] * horizontal[:, 0],
+            center[:, 0] * horizontal[:, 1] - center[:, 1] * horizontal[:, 0],
         ]
     )
     weight = robot.MASS * robot.GRAVITY
@@ -115,15 +123,15 @@ def nominal_motion(gait: Gait, inertia: tuple[float, float, float], height: floa
     )
     dt = gait.period / SAMPLES
     velocity = _integrate(acceleration - acceleration.mean(axis=0), dt)
-    share = load / np.maximum(total, 1e-9)
-    force = np.concatenate([share[..., None] * horizontal[:, None], load[..., None]], axis=2)
+    fraction = load / np.maximum(total, 1e-9)
+    force = np.concatenate([fraction[..., None] * horizontal[:, None], load[..., None]], axis=2)
     return NominalMotion(force=force, position=_integrate(velocity, dt), velocity=velocity)
 
 
 @lru_cache(maxsize=64)
 def standing_motion(gait: Gait) -> NominalMotion:
     """No motion, and the weight on all four feet of a gait's stance."""
-    load = _share_load(np.ones(4, bool), gait.nominal_feet_b, 1.0)
+    load = _distribute_load(np.ones(4, bool), gait.nominal_feet_b, 1.0)
     force = np.zeros((SAMPLES, 4, 3))
     force[..., 2] = load
     still = np.zeros((SAMPLES, 6))

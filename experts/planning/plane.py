@@ -1,19 +1,28 @@
 """Geometry of the ground plane in complex numbers: x + iy. Turning by an angle is multiplying by exp(i angle)."""
 
 import cmath
+from typing import overload
 
 import numpy as np
 
 
-def to_complex(vector: np.ndarray) -> np.ndarray | complex:
-    """x + iy of planar vectors (..., 2) or of the horizontal part of spatial ones (..., 3)."""
-    if vector.ndim == 1:
-        return complex(vector[0], vector[1])
-    return vector[..., 0] + 1j * vector[..., 1]
+def to_complex(vector: np.ndarray) -> complex:
+    """The horizontal part x + iy of one planar vector, shape (2,), or spatial one, shape (3,)."""
+    return complex(vector[0], vector[1])
 
 
-def turn(yaw: np.ndarray | float) -> np.ndarray | complex:
+def to_complex_array(vectors: np.ndarray) -> np.ndarray:
+    """The horizontal parts x + iy, shape (...), of planar vectors (..., 2) or of spatial ones (..., 3)."""
+    return vectors[..., 0] + 1j * vectors[..., 1]
+
+
+@overload
+def turn(yaw: float) -> complex: ...
+@overload
+def turn(yaw: np.ndarray) -> np.ndarray: ...
+def turn(yaw: float | np.ndarray) -> complex | np.ndarray:
     """The factor exp(i yaw) that turns a planar vector by an angle [rad]."""
+    # cmath takes a tenth of NumPy's time for one number.
     return np.exp(1j * yaw) if isinstance(yaw, np.ndarray) else cmath.rect(1.0, yaw)
 
 

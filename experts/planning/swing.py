@@ -70,7 +70,7 @@ class SwingRule:
             dynamics.feet_w,
             dynamics.feet_velocity_w,
             to_complex(dynamics.com_w),
-            to_complex(velocity_w) + 0j,
+            to_complex(velocity_w),
             float(state.command[2]),
             arc,
             (self.stiffness, self.damping),
@@ -108,9 +108,12 @@ def _track(
 
     Args:
         progress: fraction of each leg's swing that is over, shape (4,).
-        ahead_s, feet, feet_velocity: as in `SwingRule.acceleration` and `Dynamics`.
+        ahead_s: h of `SwingRule.acceleration` [s], shape (4,).
         landing: where the feet are to land, world [m], shape (4, 3).
-        com, velocity: horizontal, x + iy [m], [m/s].
+        feet: where they are, world [m], shape (4, 3).
+        feet_velocity: world [m/s], shape (4, 3).
+        com: of the robot, horizontal, x + iy [m].
+        velocity: of the body, horizontal, x + iy [m/s].
         yaw_rate: commanded [rad/s].
         arc: height, press [m], early, swing time, period [s], foot radius [m].
         gains: stiffness [1/s^2], damping [1/s].

@@ -6,8 +6,8 @@ feet's accelerations below,
     (1)  [M_base; J] vdot = [J_base' f - h_base; a_foot - Jdot v],
     (2)  tau = (M vdot + h - J' f) of the joints,
 
-with a_foot = -10 v_foot on the ground. (Inverse dynamics of a floating base whose contact forces are given; e.g. M.
-Mistry, J. Buchli, S. Schaal, ICRA 2010.)
+with a_foot = -10 v_foot on the ground. (Hybrid dynamics: accelerations are given for
+the feet and forces for the base; R. Featherstone, "Rigid Body Dynamics Algorithms", 2008, chapter 9.)
 """
 
 import numpy as np
@@ -21,8 +21,7 @@ def joint_torques(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Torques that realize forces of the feet on the ground and accelerations of the feet in the air.
 
-    Args:
-        dynamics, forces_w, stance, swing_acceleration_w: as of `Request.of`.
+    The arguments are those of `Request.of`.
 
     Returns:
         Joint torques [N m], shape (12,), clipped at the torque limits, and the joint accelerations [rad/s^2], shape

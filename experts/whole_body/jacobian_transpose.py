@@ -23,8 +23,7 @@ def jacobian_transpose_torques(
 
         tau_i = h_i - J_i' f_i  on the ground,    tau_i = h_i + M_i J_i^-1 (a_i - Jdot_i v)  in the air.
 
-    Args:
-        dynamics, forces_w, stance, swing_acceleration_w: as of `Request.of`.
+    The arguments are those of `Request.of`.
 
     Returns:
         Joint torques [N m], shape (12,), clipped at the torque limits, and the joint accelerations [rad/s^2], shape

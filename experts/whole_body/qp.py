@@ -140,8 +140,7 @@ class WholeBodyQP:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Torques within the limits that come closest to what is asked for.
 
-        Args:
-            dynamics, forces_w, stance, swing_acceleration_w: as of `Request.of`.
+        The arguments are those of `Request.of`.
 
         Returns:
             Joint torques [N m], shape (12,), and the joint accelerations [rad/s^2], shape (12,), that they give.
@@ -196,7 +195,7 @@ class WholeBodyQP:
         return weight
 
     def _bounds(self, stance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """l and u. A foot in the air needs no bounds: its force moves nothing, and its weight draws it to zero."""
+        """The bounds l and u, shape (32,); none for a foot in the air: its force does nothing but cost."""
         l, u = np.empty(_LIMITS), np.full(_LIMITS, np.inf)
         l[:12], u[:12] = -self._torque_limit, self._torque_limit
         l[12:] = np.where(np.repeat(stance, ROWS_PER_FOOT), -self.config.slack / _FORCE_UNIT, -np.inf)

@@ -1,6 +1,6 @@
 """What the three ways from forces to torques are asked for, and what they have in common."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,8 +11,7 @@ STANCE_DAMPING = 10.0
 """A foot on the ground is asked to decelerate at this rate [1/s]."""
 
 
-@dataclass(frozen=True)
-class Request:
+class Request(NamedTuple):
     """Ground forces for the feet that stand and accelerations for all feet.
 
     Attributes:

@@ -109,6 +109,7 @@ class ObservationLayout:
     """
 
     def __init__(self, tasks: Sequence[str], channels: Sequence[str] = (), history: int = 1) -> None:
+        """Find out where everything stands."""
         if isinstance(channels, str) or not isinstance(channels, Sequence):
             raise InvalidInputError(f'channels must be a sequence of names such as ("command",), got {channels!r}')
         for name in channels:

@@ -64,6 +64,7 @@ class RobotState:
     @cached_property
     def base_velocity(self) -> np.ndarray:
         """Measured (vx, vy [m/s], yaw rate [rad/s]) in the heading frame (world turned by yaw), shape (3,)."""
-        velocity = yaw_matrix(self.rpy[2]).T @ self.linear_velocity_w[:2]
+        (cos, _), (sin, _) = yaw_matrix(self.rpy[2])
+        vx, vy, _ = self.linear_velocity_w
         yaw_rate = self.rotation[2] @ self.angular_velocity_b
-        return np.array([*velocity, yaw_rate])
+        return np.array([cos * vx + sin * vy, cos * vy - sin * vx, yaw_rate])

@@ -4,6 +4,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from go1_mtl_gym.deprecation import renamed_arguments
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.sim.physics_params import PhysicsParams
 from go1_mtl_gym.validation import finite_vector, number_in
@@ -11,6 +12,7 @@ from go1_mtl_gym.validation import finite_vector, number_in
 Range = tuple[float, float] | None
 
 
+@renamed_arguments(share="fraction")
 @dataclass(frozen=True)
 class DomainRandomization:
     """Ranges (low, high) that an episode's figures are drawn from, uniformly; None leaves the environment's own.
@@ -19,7 +21,7 @@ class DomainRandomization:
         friction, payload_kg, action_delay_s, motor_strength, joint_friction, rotor_inertia, contact_time_s: as in
             `go1_mtl_gym.sim.physics_params.PhysicsParams`.
         noise: factor on the environment's `SensorNoise`, or on the default one if the environment has none.
-        fraction: of the episodes that are randomised; the others are as without randomization.
+        fraction: of the episodes that are randomized; the others are as without randomization.
 
     Raises:
         InvalidInputError: if a range is not low <= high, or one of its ends is an impossible figure.
@@ -36,7 +38,9 @@ class DomainRandomization:
     fraction: float = 1.0
 
     def __post_init__(self) -> None:
-        number_in(self.fraction, 0.0, 1.0, "fraction of randomised episodes")
+        """Check the ranges, and bring them into one form."""
+        fraction = number_in(self.fraction, 0.0, 1.0, "fraction of randomized episodes")
+        object.__setattr__(self, "fraction", fraction)
         for name, (low, high) in self._ranges().items():
             if low > high:
                 raise InvalidInputError(f"range of {name} must be low <= high, got {(low, high)}")

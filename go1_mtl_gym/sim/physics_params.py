@@ -1,7 +1,7 @@
 """Ways in which a real robot differs from the model that its expert has in mind: mass, motors, contacts, delay."""
 
-from collections.abc import Sequence
 from dataclasses import astuple, dataclass
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -75,9 +75,10 @@ class PhysicsParams:
         return np.array([_NONE if value is None else value for value in astuple(self)], dtype=np.float64)
 
     @classmethod
-    def from_vector(cls, vector: Sequence[float]) -> "PhysicsParams":
+    def from_vector(cls, vector: np.ndarray) -> "PhysicsParams":
         """The inverse of `as_vector`."""
-        return cls(*(None if value == _NONE else float(value) for value in vector))
+        values: list[Any] = [None if value == _NONE else value for value in vector.tolist()]
+        return cls(*values)
 
     def apply(self, model: mujoco.MjModel) -> None:
         """Change a model whose PD gains are set already; `mj_setConst` is left to the caller.
@@ -113,6 +114,7 @@ class ActionDelay:
     """
 
     def __init__(self, steps: int) -> None:
+        """Let nothing be on its way but zeros."""
         self.waiting = np.zeros((steps, 12))
 
     def reset(self, target: np.ndarray) -> None:

@@ -39,6 +39,7 @@ class Simulation:
     """
 
     def __init__(self, gains: PDGains, physics_params: PhysicsParams | None = None) -> None:
+        """Load the model; the robot's state is whatever the file says until `reset`."""
         self.model = mujoco.MjModel.from_xml_path(robot.SCENE_PATH)
         self.data = mujoco.MjData(self.model)
         self.model.opt.timestep = 1.0 / PHYSICS_HZ

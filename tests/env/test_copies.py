@@ -3,6 +3,7 @@
 import copy
 import pickle
 
+import gymnasium
 import numpy as np
 import pytest
 
@@ -92,3 +93,16 @@ def test_a_copy_of_a_copy_and_of_a_seeded_stream():
 def test_a_pickle_is_small():
     assert len(pickle.dumps(Go1Env("trot"))) < 20_000
     assert len(pickle.dumps(walking(3))) < 100_000
+
+
+@COPIERS
+def test_a_copy_keeps_the_spec_and_draws_the_same_samples(duplicate):
+    env = gymnasium.make("Go1Trot-v0", kp=40).unwrapped
+    env.action_space.seed(3), env.observation_space.seed(4)
+    env.action_space.sample(), env.observation_space.sample()
+    twin = duplicate(env)
+    assert twin.spec == env.spec and twin.spec.id == "Go1Trot-v0" and twin.spec.kwargs["kp"] == 40
+    for _ in range(3):
+        np.testing.assert_array_equal(twin.action_space.sample(), env.action_space.sample())
+        np.testing.assert_array_equal(twin.observation_space.sample(), env.observation_space.sample())
+    assert gymnasium.make(twin.spec).unwrapped.config == env.config

@@ -1,11 +1,13 @@
 """Episodes: ids, determinism, commands, tasks, and every way in which an episode ends."""
 
+import dataclasses
+
 import gymnasium
 import numpy as np
 import pytest
 
 import go1_mtl_gym
-from go1_mtl_gym import TASKS, env_id, robot
+from go1_mtl_gym import TASKS, InvalidInputError, PDGains, env_id, robot
 from go1_mtl_gym.env import Go1Env
 
 INFO = {
@@ -175,18 +177,67 @@ def test_diverged_physics_gives_a_finite_reward(bad):
     assert np.isfinite(reward) and np.isfinite(list(info["reward_terms"].values())).all()
 
 
-def test_observation_and_info_are_not_shared_with_the_environment():
-    env = Go1Env("trot", history=2)
-    env.reset(seed=0)
-    observation, *_, info = env.step(np.zeros(12))
-    kept, state = observation.copy(), env.state
-    observation[:] = 9.0
-    info["command"][:] = 9.0
-    info["contacts"][:] = False
-    state.q[:] = 9.0
-    again, *_, other = env.step(np.zeros(12))
-    np.testing.assert_array_equal(again[34:68], kept[:34])
-    assert (other["command"] != 9.0).all() and (np.abs(env.state.q) < 5).all()
+def every_array(env: Go1Env, info: dict) -> list[np.ndarray]:
+    """Everything that an environment hands out and that can be written to."""
+    states = [env.state, env.estimated_state]
+    of_states = [getattr(state, each.name) for state in states for each in dataclasses.fields(state)]
+    handed_out = [*info.values(), *of_states, *(state.rotation for state in states), env.command]
+    return [array for array in handed_out if isinstance(array, np.ndarray)]
+
+
+@pytest.mark.parametrize("seen", [{}, {"estimator_noise": True}, {"state_estimator": True}], ids=str)
+def test_nothing_that_is_handed_out_is_shared_with_the_environment(seen):
+    kwargs = {"control_hz": 200, "history": 2, "channels": ("command", "last_action"), **seen}
+    env, twin = Go1Env("trot", **kwargs), Go1Env("trot", **kwargs)
+    observation, info = env.reset(seed=0)
+    twin.reset(seed=0)
+    for action in np.random.default_rng(0).uniform(-0.1, 0.1, (5, 12)):
+        given = action.copy()
+        for array in (observation, *every_array(env, info)):
+            array[:] = 9.0 if array.dtype != bool else False
+        observation, *_, info = env.step(given)
+        given[:] = 9.0
+        expected, *_, wanted = twin.step(action)
+        np.testing.assert_array_equal(observation, expected)
+        assert same(info, wanted)
+        np.testing.assert_array_equal(env.estimated_state.q, twin.estimated_state.q)
+
+
+def test_the_action_map_cannot_be_written_to():
+    env = Go1Env("trot")
+    for array in (env.action_map.center, env.action_map.half_range):
+        with pytest.raises(ValueError, match="read-only"):
+            array[:] = 0.0
+
+
+@pytest.mark.parametrize(("kwargs", "steps"), [({}, 1500), ({"episode_s": 2.0}, 100), ({"control_hz": 100}, 3000)])
+def test_the_spec_tells_the_steps_of_an_episode(kwargs, steps):
+    env = gymnasium.make("Go1Trot-v0", **kwargs)
+    assert env.spec.max_episode_steps == steps == env.unwrapped.spec.max_episode_steps
+    assert gymnasium.make(env.spec).spec.max_episode_steps == steps
+
+
+@pytest.mark.parametrize(("kwargs", "steps"), [({"episode_s": 0.1}, 5), ({"max_episode_steps": 3}, 3)])
+def test_whoever_asks_for_a_length_gets_it(kwargs, steps):
+    made = gymnasium.make("Go1Trot-v0", **kwargs)
+    for env in (made, gymnasium.make(made.spec)):
+        assert env.spec.max_episode_steps == steps
+        env.reset(seed=0)
+        home = env.unwrapped.action_map.from_radians(robot.HOME_POSE).astype(np.float32)
+        ends = [env.step(home)[2:4] for _ in range(steps)]
+        assert ends == [(False, False)] * (steps - 1) + [(False, True)]
+
+
+def test_an_episode_longer_than_the_default_is_not_cut():
+    env = gymnasium.make("Go1Trot-v0", episode_s=31.0, disable_env_checker=True)
+    env.reset(seed=0, options={"command": (0.0, 0.0, 0.0)})
+    home = env.unwrapped.action_map.from_radians(robot.HOME_POSE).astype(np.float32)
+    assert not any(env.step(home)[3] for _ in range(1549)) and env.step(home)[3]
+
+
+def test_a_seed_may_be_numpys():
+    env = Go1Env("trot")
+    np.testing.assert_array_equal(env.reset(seed=np.int64(3))[0], env.reset(seed=3)[0])
 
 
 def test_the_expert_is_told_the_gains_and_the_control_period_and_answers_in_radians():
@@ -206,3 +257,25 @@ def test_the_expert_is_told_the_gains_and_the_control_period_and_answers_in_radi
     env.reset(seed=0)
     np.testing.assert_allclose(env.action_map.to_radians(env.expert_action()), robot.HOME_POSE, atol=1e-6)
     assert told == [(30.0, 1.0, 0.004), 0.0]
+
+
+@pytest.mark.parametrize(
+    ("attributes", "words"),
+    [
+        ({"gains": PDGains(30.0, 1.0)}, r"made for gains PDGains\(kp=30.0, kd=1.0\), .*has PDGains\(kp=50.0, kd=2.0\)"),
+        ({"hold_s": 0.002}, "made for hold_s 0.002, the environment has 0.02"),
+    ],
+)
+def test_an_expert_made_for_another_environment_is_refused(attributes, words):
+    class Stubborn:
+        def __init__(self, gains, hold_s):
+            vars(self).update({"gains": gains, "hold_s": hold_s} | attributes)
+
+        def reset(self, state):
+            pass
+
+    env = Go1Env("trot", expert=Stubborn)
+    env.reset(seed=0)
+    for _ in range(2):
+        with pytest.raises(InvalidInputError, match=words):
+            env.expert_action()

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import torch
 from gymnasium.error import ResetNeeded
 
 from go1_mtl_gym.env import Go1Env
@@ -50,6 +51,10 @@ ACTIONS = [
     ("up", r"action must be 12 numbers, got 'up'"),
     (None, r"action"),
     ([[1.0], [2.0, 3.0]], r"action must be 12 numbers"),
+    (torch.zeros(12, requires_grad=True), r"action must be 12 numbers, got tensor.*requires grad"),
+    (np.zeros(12, dtype=bool), r"action must be 12 numbers, got array"),
+    (["1"] * 12, r"action must be 12 numbers, got .'1'"),
+    (np.zeros(12, dtype=complex), r"action must be 12 numbers"),
 ]
 RUNNING = [
     (lambda env: env.set_task("moonwalk"), r"task must be one of .*got 'moonwalk'"),
@@ -62,6 +67,9 @@ RUNNING = [
     (lambda env: env.push((1.0, 2.0)), r"push.*shape \(3,\)"),
     (lambda env: env.push((np.inf, 0.0, 0.0)), r"push.*finite"),
     (lambda env: env.reset(options={"speed": 1}), r"reset option must be one of 'command', 'task'; got 'speed'"),
+    (lambda env: env.reset(options=["command"]), r"reset options must be a dictionary.*got \['command'\]"),
+    (lambda env: env.reset(options={"task": ["walk"]}), r"task must be one of.*got \['walk'\]"),
+    (lambda env: env.set_task("walk", phase=True), r"phase.*True"),
     (lambda env: env.reset(options={"task": "moonwalk"}), r"got 'moonwalk'"),
     (lambda env: env.reset(seed=1, options={"command": (0.0, 5.0, 0.0)}), r"command.*within.*got \[0.0, 5.0, 0.0\]"),
     (lambda env: env.reset(options={"command": "fast"}), r"command.*'fast'"),

@@ -1,16 +1,19 @@
 """Pictures: their shape, what is drawn into them, and what happens where none can be drawn."""
 
+import copy
 import os
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
+import gymnasium
 import mujoco
 import numpy as np
 import pytest
 
 from go1_mtl_gym import robot
 from go1_mtl_gym.env import Go1Env
-from go1_mtl_gym.rendering import CONTACT_COLOR, annotate, why_no_pictures
+from go1_mtl_gym.rendering import CONTACT_COLOR, Pace, RenderingError, annotate, why_no_pictures
 
 
 @pytest.fixture
@@ -99,10 +102,56 @@ def test_render_without_a_mode_warns_and_draws_nothing():
     env.close(), env.close()
 
 
-def test_render_fps_is_the_control_rate_up_to_fifty():
-    assert Go1Env("trot").metadata["render_fps"] == 50
-    assert Go1Env("trot", control_hz=200).metadata["render_fps"] == 50
-    assert Go1Env.metadata["render_modes"] == ["human", "rgb_array"]
+@pytest.mark.parametrize("control_hz", [50, 100, 500])
+def test_pictures_are_played_at_true_speed(control_hz):
+    env = gymnasium.make("Go1Trot-v0", control_hz=control_hz)
+    assert env.metadata["render_fps"] == control_hz == copy.deepcopy(env).metadata["render_fps"]
+    assert Go1Env.metadata == {"render_modes": ["human", "rgb_array"], "render_fps": 50}
+
+
+def test_a_window_waits_for_the_time_to_pass():
+    now, slept = [10.0], []
+
+    def sleep(seconds: float) -> None:
+        slept.append(seconds)
+        now[0] += seconds
+
+    pace = Pace(50.0, lambda: now[0], sleep)
+    for busy in (0.005, 0.015, 0.050, 0.0):  # the third one takes longer than the period
+        now[0] += busy
+        pace.wait()
+    np.testing.assert_allclose(slept, [0.015, 0.005, 0.02])
+
+
+@pytest.mark.gl
+def test_large_pictures():
+    env = Go1Env("trot", render_mode="rgb_array", width=1920, height=1080)
+    env.reset(seed=0)
+    picture = env.render()
+    assert picture.shape == (1080, 1920, 3) and picture.std() > 5
+    env.close()
+
+
+@pytest.mark.gl
+def test_another_thread_is_told_why_it_cannot_draw(env):
+    env.render()
+    for action in (env.render, env.close):
+        with ThreadPoolExecutor(1) as pool, pytest.raises(RenderingError, match="thread .* OpenGL context belongs"):
+            pool.submit(action).result()
+    assert env.render().shape == (120, 160, 3)
+
+
+@pytest.mark.gl
+def test_a_thread_may_draw_its_own_environment():
+    def draw() -> np.ndarray:
+        env = Go1Env("trot", render_mode="rgb_array", width=64, height=48)
+        env.reset(seed=0)
+        picture = env.render()
+        env.close()
+        return picture
+
+    with ThreadPoolExecutor(1) as pool:
+        np.testing.assert_array_equal(pool.submit(draw).result(), draw())
 
 
 _WITHOUT_A_DISPLAY = """

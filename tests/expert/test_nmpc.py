@@ -205,7 +205,7 @@ def test_a_trots_left_is_its_right(expert, trotting):
 
 
 @pytest.mark.parametrize(
-    ("figure", "words"),
+    ("setting", "words"),
     [
         ({"com_height": 0.5}, "com_height"), ({"linearization": "yesterday"}, "linearization.*yesterday"),
         ({"sqp_iterations": 0}, "sqp_iterations"), ({"sqp_tolerance": -1.0}, "sqp_tolerance"),
@@ -213,9 +213,9 @@ def test_a_trots_left_is_its_right(expert, trotting):
         ({"mpc_hz": float("nan")}, "mpc_hz"),
     ],
 )  # fmt: skip
-def test_impossible_figures_are_refused(figure, words):
+def test_impossible_settings_are_refused(setting, words):
     with pytest.raises(InvalidInputError, match=words):
-        NMPCConfig(**figure)
+        NMPCConfig(**setting)
 
 
 @pytest.mark.parametrize("hold_s", [1.0, -0.01, np.nan])

@@ -3,11 +3,9 @@
 from collections.abc import Mapping
 from typing import Any
 
-import torch
-
-from go1_mtl_gym.errors import InvalidInputError
 from trainers.data.environments import make_env
 from trainers.pipeline.config import JobConfig
+from trainers.policies.checkpoint import checked_device
 from trainers.policies.multi_head import MultiHeadPolicy
 
 
@@ -22,7 +20,7 @@ def new_policy(config: JobConfig, env_kwargs: Mapping[str, Any], pooled: bool = 
     Raises:
         InvalidInputError: if there can be no such environment or policy, or the device is not there.
     """
-    check_device(config.device)
+    device = checked_device(config.device)
     env = make_env(config.tasks[0], **env_kwargs)
     policy = MultiHeadPolicy(
         env.observation_space,
@@ -34,15 +32,4 @@ def new_policy(config: JobConfig, env_kwargs: Mapping[str, Any], pooled: bool = 
         seed=config.seed,
     )
     env.close()
-    return policy.to(torch.device(config.device))
-
-
-def check_device(device: str) -> str:
-    """Return the name of a device that can be trained on.
-
-    Raises:
-        InvalidInputError: if it is neither the CPU nor a GPU that is there.
-    """
-    if device != "cpu" and not (device.startswith("cuda") and torch.cuda.is_available()):
-        raise InvalidInputError(f"device must be cpu, or cuda where PyTorch finds a GPU; got {device!r}")
-    return device
+    return policy.to(device)

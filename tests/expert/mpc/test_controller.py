@@ -41,7 +41,7 @@ def level(height=0.28) -> tuple:
 
 
 def test_the_program_is_the_one_in_the_docstring(driven):
-    """Objective and constraints, from the problem's own arrays, at a random point."""
+    """Objective and constraints, from the problem's arrays, at a random point."""
     rng, config = np.random.default_rng(0), MPCConfig()
     model, x0, x_ref, u_ref, contact = driven.problems[-1]
     program = program_of(driven.problems[-1])
@@ -185,7 +185,7 @@ def test_sparsity_pattern_does_not_depend_on_the_problem(driven):
 
 
 @pytest.mark.parametrize(
-    ("figure", "words"),
+    ("setting", "words"),
     [
         ({"steps": 3}, "steps"), ({"input_weight": 0.0}, "input_weight"), ({"friction": -0.5}, "friction"),
         ({"max_force": float("nan")}, "max_force"), ({"min_force": -1.0}, "min_force"), ({"rho": 0.0}, "rho"),
@@ -195,6 +195,6 @@ def test_sparsity_pattern_does_not_depend_on_the_problem(driven):
         ({"state_weight": (-1.0,) + (1.0,) * 11}, "smallest state weight.*-1"),
     ],
 )  # fmt: skip
-def test_impossible_figures_are_refused(figure, words):
+def test_impossible_settings_are_refused(setting, words):
     with pytest.raises(InvalidInputError, match=words):
-        MPCConfig(**figure)
+        MPCConfig(**setting)

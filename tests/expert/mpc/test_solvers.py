@@ -149,10 +149,10 @@ def test_feet_in_the_air_push_with_exactly_nothing(driven, name):
 @pytest.mark.parametrize("name", SOLVERS)
 def test_equal_problems_give_equal_bits_whatever_was_solved_before(driven, name):
     used, fresh = solver(name), solver(name)
-    wanted = fresh.solve(*driven.problems[3])
+    expected = fresh.solve(*driven.problems[3])
     for problem in driven.problems:
         used.solve(*problem)
-    np.testing.assert_array_equal(used.solve(*driven.problems[3]).inputs, wanted.inputs)
+    np.testing.assert_array_equal(used.solve(*driven.problems[3]).inputs, expected.inputs)
 
 
 @pytest.mark.parametrize("name", SOLVERS)

@@ -73,8 +73,8 @@ def test_the_nominal_motion_is_turned_by_the_heading(standing, gait):
     np.testing.assert_allclose(x[:, 5], HEIGHT + deviation[:, 5], atol=1e-12)
     np.testing.assert_allclose(x[:, 11], deviation[:, 11], atol=1e-12)
     np.testing.assert_allclose(x[:, 8], 0.8 + deviation[:, 8], atol=1e-12)
-    for at, own in ((9, slice(9, 11)), (6, slice(6, 8))):
-        turned = np.einsum("ki,kij->kj", deviation[:, own], heading)
+    for at, parts in ((9, slice(9, 11)), (6, slice(6, 8))):
+        turned = np.einsum("ki,kij->kj", deviation[:, parts], heading)
         np.testing.assert_allclose((x - level)[:, at : at + 2], turned, atol=1e-12)
     sway = np.einsum("ki,kij->kj", deviation[:, 3:5], heading)
     np.testing.assert_allclose((x - level)[:, 3:5], sway - sway[0], atol=1e-12)

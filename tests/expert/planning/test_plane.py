@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from experts.planning.plane import carried, to_complex, turn
+from experts.planning.plane import carried, to_complex, to_complex_array, turn
 
 
 def test_horizontal_parts_become_complex():
-    np.testing.assert_array_equal(to_complex(np.array([[1.0, 2.0], [-3.0, 0.5]])), [1 + 2j, -3 + 0.5j])
-    np.testing.assert_array_equal(to_complex(np.array([1.0, 2.0, 9.0])), 1 + 2j)
+    np.testing.assert_array_equal(to_complex_array(np.array([[1.0, 2.0], [-3.0, 0.5]])), [1 + 2j, -3 + 0.5j])
+    assert to_complex(np.array([1.0, 2.0, 9.0])) == 1 + 2j
 
 
 def test_turning_by_a_right_angle_takes_x_to_y():

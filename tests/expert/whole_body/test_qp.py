@@ -1,5 +1,7 @@
-"""The whole-body program against an exact solution of its own, the closed form, and the physics."""
+"""The whole-body program against an independent exact solution, the closed form, and the physics."""
 
+import copy
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -133,10 +135,10 @@ def test_where_the_closed_form_clips_the_base_comes_closer_to_what_was_asked(mod
         clipped, _ = joint_torques(*call)
         if not stance.any() or (np.abs(clipped) < robot.TORQUE_LIMIT).all():
             continue
-        wanted = np.linalg.solve(*equations(Request.of(*call)))[:6]
+        target = np.linalg.solve(*equations(Request.of(*call)))[:6]
         torque, _ = qp.torques(*call)
         assert (np.abs(torque) <= robot.TORQUE_LIMIT).all()
-        errors.append([np.linalg.norm(scale * (achieved(dynamics, t, stance) - wanted)) for t in (torque, clipped)])
+        errors.append([np.linalg.norm(scale * (achieved(dynamics, t, stance) - target)) for t in (torque, clipped)])
     assert errors
     ours, theirs = np.mean(errors, axis=0)
     assert ours < theirs
@@ -149,6 +151,17 @@ def test_asking_twice_gives_the_same_bits(model, driven):
     again = [qp.torques(*call) for call in calls[::-1]][::-1]
     np.testing.assert_array_equal(first, again)
     np.testing.assert_array_equal(WholeBodyQP().torques(*calls[-1]), first[-1])
+
+
+def test_a_copy_keeps_the_counts_and_answers_alike(model, trotting):
+    calls, qp = demands(model, trotting.states, "force"), WholeBodyQP(WholeBodyConfig(friction=0.4))
+    for call in calls[:6]:
+        qp.torques(*call)
+    assert qp.solves > 0
+    for other in (copy.deepcopy(qp), pickle.loads(pickle.dumps(qp))):
+        assert (other.config, other.solves, other.failures) == (qp.config, qp.solves, qp.failures)
+        for call in calls[6:]:
+            np.testing.assert_array_equal(other.torques(*call), WholeBodyQP(qp.config).torques(*call))
 
 
 def test_unsolved_programs_are_answered_in_closed_form(model, trotting):
