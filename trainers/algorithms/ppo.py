@@ -13,6 +13,7 @@ from go1_mtl_gym.validation import number_in
 from trainers.algorithms.optimizer import adamw_one_cycle
 from trainers.data.environments import contracts_of
 from trainers.policies.multi_head import MultiHeadPolicy
+from trainers.policies.normalization import SMALLEST_SCALE
 
 CONSERVATIVE = {
     "n_steps": 512,
@@ -132,7 +133,7 @@ def _fit_critic(policy: MultiHeadPolicy, obs: torch.Tensor, returns: torch.Tenso
     """Least squares; the critic's output begins at the mean of the returns and in units of their deviation."""
     output, rng = policy.critic[-1], np.random.default_rng(seed)
     with torch.no_grad():
-        output.weight.mul_(returns.std())
+        output.weight.mul_(max(float(returns.std()), SMALLEST_SCALE))
         output.bias.fill_(returns.mean())
     optimizer, schedule = adamw_one_cycle(list(policy.critic.parameters()), 1e-3, 1e-4, CRITIC_GRADIENT_STEPS)
     for _ in range(CRITIC_GRADIENT_STEPS):
