@@ -246,7 +246,7 @@ class NMPCExpert:
             if not solution.usable:
                 return horizon.reference, horizon.nominal
             before, states, inputs = states, np.vstack([horizon.x0, solution.states]), solution.inputs
-            # The model is nonlinear in attitude and lever arms alone, so these two say whether it still holds.
+            # Attitude and lever arms are what the Jacobians depend on most: have they moved, these no longer hold.
             moved = np.abs(states - before)
             if max(moved[:, RPY].max(), moved[:, COM].max() / config.com_height) < config.sqp_tolerance:
                 break
