@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 import go1_mtl_gym
 from go1_mtl_gym.actuation import ActionMap
 from go1_mtl_gym.contract import PolicyContract
+from go1_mtl_gym.deprecation import renamed_arguments
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
 from go1_mtl_gym.validation import interval_s, number_in, one_of
 from trainers.utils.processes import keep_interrupts
@@ -63,6 +64,7 @@ class WorkerError(Go1Error, RuntimeError):
     """A process that was to step an environment is gone."""
 
 
+@renamed_arguments(kick="push", kick_interval="push_interval", corner_share="corner_fraction")
 @dataclasses.dataclass(frozen=True)
 class PerturbationConfig:
     """How demonstrations are disturbed; see `go1_mtl_gym.PerturbationWrapper`.
