@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 import go1_mtl_gym
 from go1_mtl_gym.actuation import ActionMap
 from go1_mtl_gym.contract import PolicyContract
+from go1_mtl_gym.deprecation import renamed_arguments
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
 from go1_mtl_gym.validation import interval_s, number_in, one_of
 from trainers.utils.processes import keep_interrupts
@@ -63,6 +64,7 @@ class WorkerError(Go1Error, RuntimeError):
     """A process that was to step an environment is gone."""
 
 
+@renamed_arguments(kick="push", kick_interval="push_interval", corner_share="corner_fraction")
 @dataclasses.dataclass(frozen=True)
 class PerturbationConfig:
     """How demonstrations are disturbed; see `go1_mtl_gym.PerturbationWrapper`.
@@ -149,25 +151,36 @@ def make_venv(
         InvalidInputError: if `per_task` is less than 1.
         WorkerError: if a process ends before it has made its environment.
     """
-    from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv
+    from stable_baselines3.common.vec_env import DummyVecEnv
 
     if per_task < 1:
         raise InvalidInputError(f"per_task must be at least 1, got {per_task}")
     kwargs = dict(env_kwargs or {})
     calls = [functools.partial(make_env, task, perturbation, **kwargs) for task in tasks]
     thunks: list[Callable[[], gymnasium.Env]] = [WithTasks(call) for call in calls for _ in range(per_task)]
-    if not subproc:
-        return DummyVecEnv(thunks)
+    return _in_processes(thunks) if subproc else DummyVecEnv(thunks)
+
+
+def _in_processes(thunks: list[Callable[[], gymnasium.Env]]) -> "VecEnv":
+    """A vector environment with a process per environment, which leaves Ctrl-C to this one."""
+    from stable_baselines3.common.vec_env import SubprocVecEnv
+
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         raise SystemExit(1)  # a worker that imports a script without a main guard; the script is told, by its own error
+    venv: VecEnv | None = None
     try:
         with keep_interrupts():
-            return SubprocVecEnv(thunks, start_method="spawn")
+            venv = SubprocVecEnv(thunks, start_method="spawn")
     except (EOFError, ConnectionError):
         raise WorkerError(
             "a worker process ended before it had made its environment; a script that makes environments with "
             'subproc=True must do so below `if __name__ == "__main__":`, because every worker imports it again'
         ) from None
+    except KeyboardInterrupt:
+        if venv is not None:  # it came while the processes began
+            venv.close()
+        raise
+    return venv
 
 
 def contracts_of(venv: "VecEnv") -> tuple[PolicyContract, ...]:
