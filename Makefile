@@ -61,4 +61,4 @@ docs: .venv/.installed-docs
 
 clean:
 	rm -rf .venv .venv-newest docs/_build build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache
-	find go1_mtl_gym experts trainers examples benchmarks tests -name __pycache__ -prune -exec rm -rf {} +
+	find go1_mtl_gym experts trainers examples experiments tests -name __pycache__ -prune -exec rm -rf {} +

@@ -52,7 +52,6 @@ class Agent:
         return None
 
     def prepare(self) -> float:
-        """Make what the agent is read from, on one thread; returns how long that took, whenever it was [s]."""
         return 0.0
 
     def load(self) -> Any:

@@ -1,4 +1,4 @@
-"""The published run of the main job: its metrics as records, and the tables made of them and of its settings."""
+"""The published run of the main job: its metrics as records, and the tables made of them."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -6,37 +6,13 @@ from typing import Any
 from experiments.results import Results, distinct
 from experiments.stats import Group
 from experiments.tables import count, markdown, number
-from go1_mtl_gym import TASKS, env_id
+from go1_mtl_gym import TASKS
 from go1_mtl_gym.errors import InvalidInputError
-from trainers.pipeline.config import JobConfig
-from trainers.pipeline.presets import PRESETS
 from trainers.utils.report import paper_table, results_table
 
 NAME = "main_job"
 EXPERT, STUDENT = "expert", "multi_head"
 DERIVED = ("survival_rate", "success_rate", "success_interval", "episodes")
-SETTINGS = {
-    "control_hz": "control rate [Hz]",
-    "channels": "channels",
-    "clean_s": "clean demonstrations per gait [s]",
-    "perturbed_s": "perturbed demonstrations per gait [s]",
-    "randomized": "fraction of perturbed episodes with other physics",
-    "task_interval": "time between gait transitions in them [s]",
-    "held_out_s": "held-out demonstrations per gait [s]",
-    "rounds": "DAgger rounds",
-    "dagger_s": "per gait and round [s]",
-    "width": "units per hidden layer",
-    "normalization": "normalization",
-    "batch_size": "rows per gradient step",
-    "clone_steps": "gradient steps of cloning",
-    "round_steps": "gradient steps per round",
-    "phase_free_s": "the policy's walks that tell it the phase, per gait [s]",
-    "episodes": "evaluation episodes per gait and agent",
-    "episode_s": "duration of an episode [s]",
-}
-"""Rows of the table of presets: attribute of `JobConfig` and what it is called."""
-OF_ROUNDS = ("dagger_s", "round_steps")
-"""Those that mean nothing without a DAgger round."""
 
 
 def results_of(metrics: Mapping[str, Any], command: str) -> Results:
@@ -101,8 +77,6 @@ def tables(results: Results) -> list[str]:
         "so the table says how well each network fits its own expert, not which one is better.",
         "## Wall time",
         markdown(["stage", "wall time [s]"], [[stage, f"{value:.0f}"] for stage, value in results.seconds.items()]),
-        "## Presets",
-        presets_table(),
     ]
 
 
@@ -116,32 +90,3 @@ def _by_task(results: Results) -> dict[str, dict[str, Any]]:
 
 
 _COUNTS = {"survival": "survived", "success": "succeeded"}
-
-
-def presets_table() -> str:
-    """What the presets of the main job do."""
-    configs = [JobConfig.from_preset(name) for name in PRESETS]
-    rows = [[label, *(_setting(config, name) for config in configs)] for name, label in SETTINGS.items()]
-    return markdown(["", *(f"`{name}`" for name in PRESETS)], rows)
-
-
-def _setting(config: JobConfig, name: str) -> str:
-    value = getattr(config, name)
-    if value is None or (name in OF_ROUNDS and not config.rounds):
-        return "-"
-    if isinstance(value, tuple):
-        return ", ".join(map(str, value)) or "-"
-    return value if isinstance(value, str) else f"{value:g}"
-
-
-def gaits_table() -> str:
-    """The built-in gaits and the ranges that commands are drawn from."""
-    rows = []
-    for name, task in TASKS.items():
-        gait = task.gait
-        offsets = " ".join(f"{value:g}" for value in gait.offsets)
-        spans = [f"± {value:g}" for value in task.command_range]
-        cells = [f"{gait.period:.2f}", f"{gait.duty:g}", offsets, f"{gait.step_rate:.2f}", *spans]
-        rows.append([name, f"`{env_id(name).partition(':')[2]}`", *cells])
-    header = ["gait", "id", "period [s]", "duty", "offsets FL FR RL RR", "steps/s", "vx [m/s]", "vy [m/s]"]
-    return markdown([*header, "yaw rate [rad/s]"], rows, text_columns=2)

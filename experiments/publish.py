@@ -12,6 +12,7 @@ from pathlib import Path
 
 from experiments import main_job
 from experiments.catalog import STUDIES, study_class
+from experiments.plots import save_figure
 from experiments.results import Results, read_json
 from experiments.tables import markdown
 from go1_mtl_gym.errors import InvalidInputError
@@ -71,7 +72,7 @@ PAGES = {
         "mean something on another machine.",
     ),
 }
-"""Name of the file -> page; ``main_job.md`` and ``gaits.md`` are beside them."""
+"""Name of the file -> page; ``main_job.md`` is beside them."""
 
 
 def page(name: str, folder: Path) -> str | None:
@@ -96,6 +97,14 @@ def section(name: str, results: Results, folder: Path) -> list[str]:
     return [f"## {cls.title}", *cls(cls.full).paragraphs(results), *shown]
 
 
+def draw(name: str, folder: Path) -> None:
+    """Redraw the picture of a study from its results."""
+    cls = study_class(name)
+    figure = cls(cls.full).figure(Results.read(folder / f"{name}.json"))
+    if figure is not None:
+        save_figure(figure, folder / f"{name}.png")
+
+
 def how_it_was_made(measured: list[Results]) -> list[str]:
     """Command, seed, time, processor and versions of several results."""
     rows, versions = [], {}
@@ -117,13 +126,6 @@ def main_job_page(results: Results) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def index(names: list[str]) -> str:
-    """The text of ``docs/results/README.md``."""
-    titles = {name: each.title for name, each in PAGES.items()} | {main_job.NAME: "The main job", "gaits": "Gaits"}
-    links = "\n".join(f"- [{titles[name]}]({name}.md)" for name in names)
-    return f"# Results\n\n{GENERATED}\n\n{links}\n"
-
-
 def summarized(text: str, table: str) -> str:
     """A text with a table between the markers of the summary.
 
@@ -142,16 +144,13 @@ def texts(root: Path) -> dict[Path, str]:
     folder, readme = root / "docs" / "results", root / "README.md"
     if not readme.is_file():
         raise InvalidInputError(f"there is no {readme}")
-    found = {"gaits": f"# Gaits\n\n{GENERATED}\n\n{main_job.gaits_table()}\n"}
-    files = {}
+    files = {folder / f"{name}.md": text for name in PAGES if (text := page(name, folder)) is not None}
     path = folder / f"{main_job.NAME}.json"
     if path.is_file():
         results = Results.read(path)
-        found[main_job.NAME] = main_job_page(results)
+        files[path.with_suffix(".md")] = main_job_page(results)
         files[readme] = summarized(readme.read_text(encoding="utf-8"), main_job.summary_table(results))
-    found |= {name: text for name in PAGES if (text := page(name, folder)) is not None}
-    files |= {folder / f"{name}.md": text for name, text in found.items()}
-    return files | {folder / "README.md": index(list(found))}
+    return files
 
 
 # -- A run of the main job ---------------------------------------------------------------------------------------------
@@ -209,7 +208,10 @@ def publish_command(arguments: list[str], root: Path = ROOT) -> None:
     parser = argparse.ArgumentParser(prog="python -m experiments publish", description=about)
     parser.add_argument("run", type=Path, nargs="?", help="output folder of a finished main job, copied first")
     parser.add_argument("--check", action="store_true", help="change nothing; fail if something is out of date")
+    parser.add_argument("--draw", nargs="+", default=[], choices=tuple(STUDIES), help="redraw the pictures of studies")
     options = parser.parse_args(arguments)
+    for name in options.draw:
+        draw(name, root / "docs" / "results")
     texts(root)  # a README without markers is an error before anything is copied
     if options.run is not None and not options.check:
         copy_run(options.run, root)

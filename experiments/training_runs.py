@@ -102,7 +102,6 @@ class TrainedPolicy(PolicyFile):
         return self.run
 
     def prepare(self) -> float:
-        """See `TrainingRun.make`."""
         return self.run.make()
 
 

@@ -18,9 +18,9 @@ ROOT = Path(__file__).resolve().parents[1]
 PINOCCHIO = {"pinocchio", "osqp"}
 LEARNING = {"torch", "stable_baselines3", "imitation"}
 FORBIDDEN = {
-    "go1_mtl_gym": {"experts", "trainers"} | PINOCCHIO | LEARNING,
-    "experts": {"trainers"} | LEARNING,
-    "trainers": {"experts"} | PINOCCHIO,
+    "go1_mtl_gym": {"experts", "trainers", "experiments"} | PINOCCHIO | LEARNING,
+    "experts": {"trainers", "experiments"} | LEARNING,
+    "trainers": {"experts", "experiments"} | PINOCCHIO,
 }
 
 

@@ -76,11 +76,9 @@ class ExpertBenchmark(Study):
     alone = True
 
     def agents(self) -> list[Agent]:
-        """All of them together: they take turns."""
         return [Agent("all")]
 
     def cells(self, agent: Agent) -> list[Cell]:
-        """One walk."""
         return [Cell(self.options.task)]
 
     def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:

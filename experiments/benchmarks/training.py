@@ -36,24 +36,22 @@ class TrainingBenchmark(Study):
     full = TrainingOptions()
     quick = TrainingOptions(
         rounds=2,
-        rows=2000,
+        rows=4000,
         batch_size=256,
         widths=(32,),
         threads=(1,),
         steps=3,
         learning_steps=10,
         heads=(1, 4),
-        stored_rows=4000,
+        stored_rows=8000,
         collect_s=0.2,
     )
     alone = True
 
     def agents(self) -> list[Agent]:
-        """All of them together: they take turns."""
         return [Agent("all")]
 
     def cells(self, agent: Agent) -> list[Cell]:
-        """The sections."""
         return [Cell(name) for name in self.options.sections]
 
     def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:

@@ -215,7 +215,6 @@ class Settings(ExpertStudy):
     code = (*ExpertStudy.code, "experiments.pushing", "experiments.searches")
 
     def agents(self) -> list[Agent]:
-        """The expert with each of the settings."""
         return [Agent(name) for name in SETTINGS]
 
     def measure(self, agent: Agent, cell: Any, seed: int) -> dict[str, Any]:

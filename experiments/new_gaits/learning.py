@@ -136,10 +136,7 @@ class GaitTraining:
         return self._headed(rows, tuning, rehearsal(self.base, self.options, self.folder))
 
     def _headed(
-        self,
-        rows: trainers.Demonstrations,
-        bc: trainers.BCConfig,
-        rehearsed: trainers.Demonstrations | None = None,
+        self, rows: trainers.Demonstrations, bc: trainers.BCConfig, rehearsed: trainers.Demonstrations | None = None
     ) -> trainers.MultiHeadPolicy:
         """The trained policy with a head that began as the closest of its own and has learned."""
         policy = self.base.add_task(self.gait, self.seed, like=trainers.closest_task(self.base, rows))
@@ -186,7 +183,7 @@ def rehearsal(base: trainers.MultiHeadPolicy, options: NewGaitOptions, folder: P
         job = options.job_of(base, base.tasks, 0)
         perturbation, world = job.perturbation(NOISE_RAD), job.randomization_kwargs
         walks = [
-            trainers.watch(base, task, derive_seed("rehearse", i), options.rehearsal_s, perturbation, **world)[0]
+            trainers.watch(base, task, derive_seed("rehearse", i), options.rehearsal_s, perturbation, **world)
             for i, task in enumerate(base.tasks)
         ]
         trainers.Demonstrations.concatenate(walks).save(path)

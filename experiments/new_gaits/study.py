@@ -90,7 +90,6 @@ class NewGaits(Study):
         return [Agent(EXPERT, env_kwargs=kwargs), *(Agent(name, env_kwargs=kwargs) for name in (BEFORE, *METHODS))]
 
     def cells(self, agent: Agent) -> list[Cell]:
-        """Every gait, budget and training seed; the longest trainings come first."""
         options = self.options
         if agent.name == BEFORE:
             return [Cell(ALL_GAITS, OLD)]
@@ -100,7 +99,6 @@ class NewGaits(Study):
         return [Cell(gait, budget, seed) for budget in budgets for gait in options.gaits for seed in options.seeds]
 
     def prepare(self, n_jobs: int) -> None:
-        """Have everything demonstrated that the trainings share."""
         options, base, jobs = self.options, self.base.load(), []
         for gait in options.gaits:
             seeds = [options.job_of(base, (gait,), seed) for seed in options.seeds]

@@ -17,18 +17,9 @@ def _errors(mse: float, mae: float, r2: float) -> Mapping[str, float]:
 PUBLISHED: Mapping[str, Mapping[str, Mapping[str, Mapping[str, float]]]] = MappingProxyType(
     {
         "simulation": {
-            "trot": {
-                MULTI_HEAD: _errors(0.000528, 0.017643, 0.919537),
-                POOLED: _errors(0.001484, 0.030213, 0.770130),
-            },
-            "jump": {
-                MULTI_HEAD: _errors(0.003534, 0.016015, 0.892613),
-                POOLED: _errors(0.006990, 0.034837, 0.796875),
-            },
-            "bound": {
-                MULTI_HEAD: _errors(0.000416, 0.011603, 0.991763),
-                POOLED: _errors(0.005179, 0.048135, 0.906929),
-            },
+            "trot": {MULTI_HEAD: _errors(0.000528, 0.017643, 0.919537), POOLED: _errors(0.001484, 0.030213, 0.770130)},
+            "jump": {MULTI_HEAD: _errors(0.003534, 0.016015, 0.892613), POOLED: _errors(0.006990, 0.034837, 0.796875)},
+            "bound": {MULTI_HEAD: _errors(0.000416, 0.011603, 0.991763), POOLED: _errors(0.005179, 0.048135, 0.906929)},
         },
         "hardware": {
             "trot": {MULTI_HEAD: _errors(0.000225, 0.007600, 0.971015)},

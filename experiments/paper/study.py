@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar, NamedTuple
 
-import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
@@ -21,8 +20,6 @@ from experiments.stats import Group, group
 from experiments.study import ALL_GAITS, Cell, Metrics, Study
 from experiments.tables import estimated, markdown, number
 from experiments.training_runs import collect
-from go1_mtl_gym import robot
-from go1_mtl_gym.sensing.observation import ObservationLayout
 
 SHOWN = {"mse": "MSE [rad^2]", "mae": "MAE [rad]", "r2": "R2", "r2_joint_mean": "R2, mean of joints"}
 DIGITS = {"mse": ".6f", "mae": ".5f", "r2": ".5f", "r2_joint_mean": ".5f"}
@@ -51,8 +48,7 @@ class PaperStudy(Study):
     table_of: ClassVar[Table]
     caption = "Held-out loss per gait over the gradient steps; a line per training seed"
     more_captions: ClassVar[dict[str, str]] = {
-        "_targets": "Joint targets of the front left leg, of student and expert, on held-out rows",
-        "_contacts": "Feet on the ground, of the expert on held-out rows",
+        "_targets": "Joint targets of the front left leg, of student and expert, on held-out rows"
     }
     full = PaperOptions()
     quick = settings.QUICK
@@ -70,11 +66,9 @@ class PaperStudy(Study):
         return replace(self.cell_options, steps=1, precision="float32", device="cpu", threads=1)
 
     def agents(self) -> list[Agent]:
-        """The kinds of networks, and the expert, of whom the data is."""
         return [Agent(EXPERT), *map(Agent, self.options.kinds)]
 
     def cells(self, agent: Agent) -> list[Cell]:
-        """Every width and training seed, and gait where there is a network for each."""
         if agent.name == EXPERT:
             return [Cell(ALL_GAITS, "data")]
         tasks = self.table_of.gaits if agent.name == PER_GAIT else (ALL_GAITS,)
@@ -84,7 +78,6 @@ class PaperStudy(Study):
         ]
 
     def prepare(self, n_jobs: int) -> None:
-        """Let the expert walk with every command."""
         collect([job for jobs in shard_jobs(self.table_of, self.options).values() for job in jobs], self.folder, n_jobs)
 
     def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:
@@ -151,13 +144,12 @@ class PaperStudy(Study):
         return figure
 
     def more_figures(self) -> dict[str, Figure]:
-        """Joint targets of the widest multi-head network, and contacts, on held-out rows."""
-        rows = next(iter(held_out(self.table_of, self.options, self.folder).values()))
-        figures = {"_contacts": contact_figure(rows)}
+        """Joint targets of the widest multi-head network on held-out rows."""
         widest = self.network(MULTI_HEAD, max(self.options.widths), self.options.seeds[0]).file
-        if widest.is_file():
-            figures["_targets"] = trainers.joint_target_figure(trainers.load(widest), rows)
-        return figures
+        if not widest.is_file():
+            return {}
+        rows = next(iter(held_out(self.table_of, self.options, self.folder).values()))
+        return {"_targets": trainers.joint_target_figure(trainers.load(widest), rows)}
 
 
 class Simulation(PaperStudy):
@@ -297,39 +289,3 @@ def summary(measured: Mapping[str, Results]) -> list[str]:
     theirs = [f"{PAPERS_KINDS[kind]}, paper" for kind in (MULTI_HEAD, POOLED)]
     header = ["data", "gait", *theirs, "width, steps, trained in", *(f"{kind}, here" for kind in KINDS.values())]
     return ["## R2 at a glance", markdown(header, rows, text_columns=2)]
-
-
-def contact_figure(rows: trainers.Demonstrations, seconds: float = 1.0) -> Figure:
-    """Feet on the ground over the last `seconds` of the first episode of every gait.
-
-    Args:
-        rows: of the expert, without channels and history.
-        seconds: how much is shown [s].
-    """
-    per_gait = rows.per_task()
-    figure = plots.new_figure(3.3 * len(per_gait) + 0.4, 1.9)
-    axes = figure.subplots(1, len(per_gait), squeeze=False, sharey=True)[0]
-    place = ObservationLayout(rows.tasks).slices["contacts"]
-    for ax, (gait, own) in zip(axes, per_gait.items()):
-        episode, hz = next(own.episodes()), own.control_hz
-        contacts = own.obs[max(episode.start, episode.stop - round(seconds * hz)) : episode.stop, place] > 0.5
-        for leg in range(4):
-            spans = [(begin / hz, length / hz) for begin, length in stances(contacts[:, leg])]
-            ax.broken_barh(spans, (leg - 0.35, 0.7), color=plots.BLUE)
-        ax.set_xlim(0, len(contacts) / hz)
-        ax.set_title(gait, fontsize=10)
-        ax.set_xlabel("time [s]", fontsize=9)
-        ax.tick_params(labelsize=8)
-    axes[0].set_yticks(range(4), robot.LEGS, fontsize=8)
-    axes[0].invert_yaxis()
-    return figure
-
-
-def stances(contact: np.ndarray) -> list[tuple[int, int]]:
-    """First row and number of rows of every stretch on the ground.
-
-    Args:
-        contact: of one foot, bool, shape (n,).
-    """
-    edges = np.flatnonzero(np.diff(contact.astype(int), prepend=0, append=0))
-    return [(int(begin), int(end - begin)) for begin, end in zip(edges[::2], edges[1::2])]

@@ -115,12 +115,10 @@ class Ablation(Study):
     code = (*Study.code, "experiments.student.transitions", "experiments.training_runs")
 
     def agents(self) -> list[Agent]:
-        """Every variant; the expert is another one for other gains and rates, and is left out."""
         runs = {name: TrainingRun(self.options.job(name), self.cache / "training") for name in self.options.variants}
         return [TrainedPolicy(name, path=run.policy, run=run) for name, run in runs.items()]
 
     def cells(self, agent: Agent) -> list[Cell]:
-        """The two worlds, the one-step errors, and the gaits that are changed to from each."""
         tasks = self.options.job(agent.name).tasks
         return [
             Cell(task, condition)

@@ -116,15 +116,12 @@ class Budget(Study):
     code = (*Study.code, "experiments.training_runs")
 
     def agents(self) -> list[Agent]:
-        """The methods."""
         return [Agent(name) for name in METHODS]
 
     def cells(self, agent: Agent) -> list[Cell]:
-        """One per training seed: all budgets of a method follow from each other."""
         return [Cell(ALL_GAITS, seed=seed) for seed in self.options.seeds]
 
     def prepare(self, n_jobs: int) -> None:
-        """Have everything demonstrated that the methods share."""
         options = self.options
         kinds = [(seed, perturbed) for seed in options.seeds for perturbed in (False, True)]
         jobs = [job for kind in kinds for job in options.demonstrations(*kind, options.budgets_s[-1])]

@@ -68,7 +68,6 @@ class Commanded(Study):
     code = (*Study.code, "experiments.student.phase", "experiments.training_runs")
 
     def agents(self) -> list[Agent]:
-        """Every seed's policy, the same without a clock, and the expert."""
         root, policies, phase_free = self.cache / "training", [], []
         for seed in self.options.seeds:
             run = TrainingRun(replace(self.options.job, seed=seed), root)
@@ -79,7 +78,6 @@ class Commanded(Study):
         return [*policies, *phase_free, Expert(env_kwargs=shared)]
 
     def cells(self, agent: Agent) -> list[Cell]:
-        """Every gait, and every kind of commands."""
         conditions = (DRAWN, CORRECTED) if agent.name == PHASE_FREE else (DRAWN, CORNERS)
         return [Cell(task, condition) for task in self.options.job.tasks for condition in conditions]
 

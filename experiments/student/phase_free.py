@@ -176,11 +176,9 @@ class PhaseFree(Study):
         return [*(Agent(name) for name in VARIANTS), *corrected]
 
     def cells(self, agent: Agent) -> list[Cell]:
-        """All of an agent in one, so that a variant is trained once."""
         return [Cell(ALL_GAITS)]
 
     def prepare(self, n_jobs: int) -> None:
-        """Have everything demonstrated that the variants share."""
         collect([*self.options.training, *self.options.held_out], self.folder, n_jobs)
 
     def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:

@@ -61,11 +61,9 @@ class Pushes(Study):
     takes_policies = True
 
     def agents(self) -> list[Agent]:
-        """The policies, and the expert in their environment."""
         return with_expert(self.policies or [shipped(STUDENT, "clocked")])
 
     def cells(self, agent: Agent) -> list[Cell]:
-        """Every gait and direction."""
         return [Cell(task, direction) for task in tasks_of(agent) for direction in self.options.directions]
 
     def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:

@@ -68,11 +68,9 @@ class Robustness(Study):
     takes_policies = True
 
     def agents(self) -> list[Agent]:
-        """The policies, and the expert in their environment."""
         return with_expert(self.policies or [shipped(STUDENT, "clocked")])
 
     def cells(self, agent: Agent) -> list[Cell]:
-        """Every gait and quantity."""
         return [Cell(task, quantity) for task in tasks_of(agent) for quantity in self.options.quantities]
 
     def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:

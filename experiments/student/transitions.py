@@ -43,11 +43,9 @@ class Transitions(Study):
     takes_policies = True
 
     def agents(self) -> list[Agent]:
-        """The policies, and the expert in their environment."""
         return with_expert(self.policies or [shipped(STUDENT, "clocked")])
 
     def cells(self, agent: Agent) -> list[Cell]:
-        """All ordered pairs of gaits."""
         tasks = tasks_of(agent)
         return [Cell(first, f"to {second}") for first in tasks for second in other_gaits(first, tasks)]
 
