@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from go1_mtl_gym import GAITS, robot
+from go1_mtl_gym import GAITS, TASKS, robot
 from go1_mtl_gym.env import Go1Env
 
 COMMAND = np.array([0.4, 0.1, 0.3])

@@ -46,8 +46,8 @@ def evaluate_transition(
         n_jobs: processes.
         progress: show a bar.
         make_env: another environment factory.
-        env_kwargs: of the environment, on top of the policy's own ``env_kwargs``; it must know both tasks, and knows all
-            that are registered unless told otherwise.
+        env_kwargs: of the environment, on top of the policy's own ``env_kwargs``. It must know both tasks; unless told
+            otherwise, it knows all that are registered.
 
     Returns:
         Its task is "FIRST to SECOND", its seconds are `after_s`.
