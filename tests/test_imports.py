@@ -18,9 +18,9 @@ ROOT = Path(__file__).resolve().parents[1]
 PINOCCHIO = {"pinocchio", "osqp"}
 LEARNING = {"torch", "stable_baselines3", "imitation"}
 FORBIDDEN = {
-    "go1_mtl_gym": {"experts", "trainers"} | PINOCCHIO | LEARNING,
-    "experts": {"trainers"} | LEARNING,
-    "trainers": {"experts"} | PINOCCHIO,
+    "go1_mtl_gym": {"experts", "trainers", "experiments"} | PINOCCHIO | LEARNING,
+    "experts": {"trainers", "experiments"} | LEARNING,
+    "trainers": {"experts", "experiments"} | PINOCCHIO,
 }
 
 
@@ -92,9 +92,9 @@ def test_one_version_everywhere():
 
 
 def packaged() -> set[str]:
-    """The modules, models and policies of the packages, relative to the root."""
+    """The modules, their marks of being typed, models and policies of the packages, relative to the root."""
     files = (path for package in FORBIDDEN for path in (ROOT / package).rglob("*"))
-    return {path.relative_to(ROOT).as_posix() for path in files if path.suffix in {".py", ".xml", ".zip"}}
+    return {path.relative_to(ROOT).as_posix() for path in files if path.suffix in {".py", ".typed", ".xml", ".zip"}}
 
 
 def built(target: str, folder: Path) -> Path:

@@ -59,6 +59,7 @@ class SwingRule:
         """
         gait = state.gait
         leg = (gait.leg_phase(state.phase) + ahead_s / gait.period) % 1.0
+        # In stance the swing to come counts as just begun: the answer is not used, but must be finite.
         progress = np.maximum(leg - gait.duty, 0.0) / (1.0 - gait.duty)
         remaining = (1.0 - progress) * gait.swing_s + ahead_s
         landing = footholds.plan(state, dynamics.com_w, velocity_w, remaining)

@@ -7,8 +7,8 @@ import numpy as np
 from go1_mtl_gym import TASKS
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import one_of
-from trainers.data.environments import EnvFactory, derive_seed, make_env
-from trainers.evaluation.rollout import Rollout, controller, opened, run_all
+from trainers.data.environments import EnvFactory, base_env, derive_seed, make_env
+from trainers.evaluation.rollout import Rollout, check_agent, opened, run_all
 from trainers.evaluation.scoring import ClosedLoopResult, EpisodeRecord, score
 from trainers.utils.validation import refuse_overridden
 
@@ -62,7 +62,7 @@ def evaluate_transition(
         raise InvalidInputError(
             f"trials must be >= 1, before_s >= 0 and after_s > 0, got {trials}, {before_s} and {after_s}"
         )
-    controller(policy_or_expert, None)
+    check_agent(policy_or_expert)
     kwargs["episode_s"] = before_s + TASKS[first].gait.period + after_s + 1.0
 
     def call(i: int) -> tuple[Any, ...]:
@@ -89,7 +89,7 @@ def _trial(
     command = tuple((rng.uniform(-1.0, 1.0, 3) * span).tolist())
     before_s += rng.uniform() * TASKS[first].gait.period
     with opened(make_env, first, env_kwargs) as env:
-        base = env.unwrapped
+        base = base_env(env)
         rollout = Rollout(env, policy_or_expert, seed, {"task": first, "command": command})
         rollout.walk(round(before_s * base.control_hz))
         if not rollout.fallen:

@@ -1,1 +1,0 @@
-"""What `benchmarks/training.py` is made of."""

@@ -1,1 +1,0 @@
-"""What `examples/publish_results.py` writes, and from what."""

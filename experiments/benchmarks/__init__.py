@@ -1,0 +1,1 @@
+"""Times of the expert and of the training, next to others'."""

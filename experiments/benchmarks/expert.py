@@ -1,0 +1,195 @@
+"""How fast is the expert, next to itself with exact QP solvers and next to a public controller of its kind?"""
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.agents import Agent
+from experiments.benchmarks.peers import Go2ConvexMPC
+from experiments.pushing import CRUISE
+from experiments.results import Results
+from experiments.stats import group
+from experiments.study import Cell, Metrics, Study
+from experiments.tables import markdown
+from experts import MPCConfig, NMPCConfig, NMPCExpert
+from go1_mtl_gym import TASKS, Go1Env, Go1Error
+from go1_mtl_gym.sensing.state import RobotState
+from go1_mtl_gym.validation import number_in, one_of
+
+OURS = "ours, osqp"
+EXACT = ("daqp", "piqp")
+"""Exact solvers that the expert can use instead; the first one at hand is what errors are counted from."""
+SCOPES = {
+    "qp": "QP: from its matrices to a solution",
+    "update": "MPC update: from the robot's dynamics to ground forces",
+    "action": "action: from the robot's state to joint commands",
+}
+"""What is timed -> its meaning."""
+FORCE_ERROR = "force error"
+WARM_UP = 10
+"""States at which nothing is timed yet."""
+Call = Callable[[RobotState], dict[str, float]]
+"""Answers at a state and gives the seconds of each scope."""
+
+
+@dataclass(frozen=True)
+class ExpertOptions:
+    """One walk at 50 Hz.
+
+    Attributes:
+        task: gait; the peer knows trot only.
+        states: at which everybody answers.
+        go2_convex_mpc: folder of a checkout of that repository; empty: without it.
+
+    Raises:
+        InvalidInputError: if a number is outside its range.
+    """
+
+    task: str = "trot"
+    states: int = 400
+    go2_convex_mpc: str = ""
+
+    def __post_init__(self) -> None:
+        one_of(self.task, tuple(TASKS), "task")
+        number_in(self.states, 1, 1e6, "states")
+
+
+class ExpertBenchmark(Study):
+    """The expert's times in turns with exact QP solvers and with a public controller."""
+
+    name = "benchmark_expert"
+    title = "Expert against others"
+    note = (
+        "One process, one thread, one walk; at every state of it all answer in turn. daqp and piqp: our expert with "
+        "these exact solvers in OSQP's place. "
+        "[go2-convex-mpc](https://github.com/elijah-waichong-chan/go2-convex-mpc): a convex MPC of the Unitree Go2 in Python, CasADi and OSQP with a horizon like ours, asked at our robot's "
+        "states with our gait; it answers with its own model, weights and tolerances, and its QP is timed by its own "
+        "clock."
+    )
+    full = ExpertOptions()
+    quick = ExpertOptions(states=5)
+    alone = True
+
+    def agents(self) -> list[Agent]:
+        return [Agent("all")]
+
+    def cells(self, agent: Agent) -> list[Cell]:
+        return [Cell(self.options.task)]
+
+    def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:
+        """Median and 99th percentile of everybody and scope, ratios to ours, and distances from the exact forces."""
+        calls = contestants(self.options)
+        times: dict[tuple[str, str], list[float]] = {}
+        errors: dict[str, list[float]] = {}
+        for i, state in enumerate(walk(cell.task, self.options.states + WARM_UP, seed)):
+            for name, call in calls.items():
+                for scope, seconds in call(state).items():
+                    if i >= WARM_UP:
+                        times.setdefault((name, scope), []).append(1e3 * seconds)
+            for name, error in force_errors(calls).items():
+                errors.setdefault(name, []).append(error)
+        medians = {key: float(np.median(values)) for key, values in times.items()}
+        records = [
+            {
+                "agent": name,
+                "condition": scope,
+                "median_ms": medians[name, scope],
+                "p99_ms": float(np.quantile(values, 0.99)),
+                "ratio": medians[name, scope] / medians[OURS, scope],
+            }
+            for (name, scope), values in times.items()
+        ]
+        forces = {name: {"median_n": np.median(v), "largest_n": np.max(v)} for name, v in errors.items()}
+        return records + [{"agent": name, "condition": FORCE_ERROR, **own} for name, own in forces.items()]
+
+    def published_options(self) -> dict[str, Any]:
+        """Without the folder, which only its machine knows."""
+        checkout = "PATH" if self.options.go2_convex_mpc else ""
+        return super().published_options() | {"go2_convex_mpc": checkout}
+
+    def table(self, results: Results) -> str:
+        """One row per thing timed and contestant."""
+        scopes, rows = group(results.records, "condition"), []
+        for scope, meaning in SCOPES.items():
+            for own in scopes.get(scope, ()):
+                times = [f"{own[key]:.2f}" for key in ("median_ms", "p99_ms", "ratio")]
+                rows.append([meaning, own["agent"], *times])
+        return markdown(["timed", "agent", "median [ms]", "p99 [ms]", "in units of ours"], rows, text_columns=2)
+
+
+def walk(task: str, count: int, seed: int) -> Iterator[RobotState]:
+    """States of successive control steps (50 Hz) of our expert, after a second of walking."""
+    env = Go1Env(task, episode_s=1e6)
+    env.reset(seed=seed, options={"command": CRUISE})
+    for i in range(50 + count):
+        if i >= 50:
+            yield env.state
+        if env.step(env.expert_action())[4]["fallen"]:
+            raise Go1Error(f"the robot fell after {i} steps of {task}; nothing can be compared")
+
+
+class Ours:
+    """Our expert with some settings of its MPC.
+
+    Args:
+        config: the settings.
+
+    Raises:
+        ImportError: if the QP solver is not installed.
+    """
+
+    def __init__(self, config: MPCConfig) -> None:
+        self.expert = NMPCExpert(config=NMPCConfig(mpc=config))
+        self.problem: tuple[Any, ...] = ()
+        self.solution: Any = None
+        mpc = self.expert._mpc
+        solve = mpc.solve
+
+        def remember(*problem: Any) -> Any:
+            self.problem, self.solution = problem, solve(*problem)
+            return self.solution
+
+        mpc.solve = remember
+
+    def __call__(self, state: RobotState) -> dict[str, float]:
+        """Seconds of every scope."""
+        dynamics, mpc = self.expert._model.dynamics(state), self.expert._mpc
+        update = _seconds(lambda: self.expert.forces(state, dynamics))
+        data = _seconds(lambda: mpc.program.update(*self.problem))
+        both = _seconds(lambda: mpc.solve(*self.problem))
+        return {"qp": both - data, "update": update, "action": _seconds(lambda: self.expert.action(state))}
+
+
+def contestants(options: ExpertOptions) -> dict[str, Call]:
+    """Who takes part; solvers that are not installed are named on standard error.
+
+    Raises:
+        MissingPeer: if the checkout that was asked for cannot be used.
+    """
+    calls: dict[str, Call] = {OURS: Ours(MPCConfig())}
+    for name in EXACT:
+        try:
+            calls[f"ours, {name}"] = Ours(MPCConfig(solver=name))
+        except ImportError as error:
+            print(f"{name} is left out: {error}; pip install {name}", file=sys.stderr)
+    if options.go2_convex_mpc:
+        calls["go2-convex-mpc"] = Go2ConvexMPC(Path(options.go2_convex_mpc), TASKS[options.task].gait, CRUISE)
+    return calls
+
+
+def force_errors(calls: dict[str, Call]) -> dict[str, float]:
+    """Largest difference of a force component from an exact solver's solution of the same problem [N]."""
+    ours = {name: call.solution.forces_w for name, call in calls.items() if isinstance(call, Ours)}
+    exact = next((ours[f"ours, {name}"] for name in EXACT if f"ours, {name}" in ours), None)
+    return {} if exact is None else {name: float(np.abs(forces - exact).max()) for name, forces in ours.items()}
+
+
+def _seconds(call: Callable[[], Any]) -> float:
+    start = time.perf_counter()
+    call()
+    return time.perf_counter() - start

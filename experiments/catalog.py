@@ -1,0 +1,43 @@
+"""Every study by name, imported when it is asked for."""
+
+from importlib import import_module
+
+from experiments.study import Study
+from go1_mtl_gym.validation import one_of
+
+STUDIES = {
+    "expert_commands": "experiments.expert.commands:Commands",
+    "expert_limits": "experiments.expert.limits:Limits",
+    "expert_pushes": "experiments.expert.limits:Pushes",
+    "expert_steady": "experiments.expert.steady:Steady",
+    "expert_transitions": "experiments.expert.transitions:Transitions",
+    "expert_labels": "experiments.expert.labels:Labels",
+    "expert_settings": "experiments.expert.timing:Settings",
+    "expert_timing": "experiments.expert.timing:Timing",
+    "expert_long_walk": "experiments.expert.transitions:LongWalk",
+    "student_commanded": "experiments.student.commanded:Commanded",
+    "student_transitions": "experiments.student.transitions:Transitions",
+    "student_robustness": "experiments.student.robustness:Robustness",
+    "student_pushes": "experiments.student.pushes:Pushes",
+    "student_ablation": "experiments.student.ablation:Ablation",
+    "student_budget": "experiments.student.budget:Budget",
+    "student_phase_free": "experiments.student.phase_free:PhaseFree",
+    "paper_simulation": "experiments.paper.study:Simulation",
+    "paper_hardware": "experiments.paper.study:Hardware",
+    "paper_hardware_half_noise": "experiments.paper.study:HalfNoise",
+    "paper_hardware_estimator": "experiments.paper.study:Estimator",
+    "benchmark_expert": "experiments.benchmarks.expert:ExpertBenchmark",
+    "benchmark_training": "experiments.benchmarks.training:TrainingBenchmark",
+    "new_gaits": "experiments.new_gaits.study:NewGaits",
+}
+"""Name -> module and class."""
+
+
+def study_class(name: str) -> type[Study]:
+    """The class of a study.
+
+    Raises:
+        InvalidInputError: if there is no study of that name.
+    """
+    module, _, cls = STUDIES[one_of(name, tuple(STUDIES), "study")].partition(":")
+    return getattr(import_module(module), cls)

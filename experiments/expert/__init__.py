@@ -1,0 +1,1 @@
+"""The expert alone, gait by gait."""

@@ -1,0 +1,90 @@
+"""Drawn commands from a standing start: kept for a whole episode, and changing."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from experiments.expert.lab import ExpertOptions, ExpertStudy, Lab
+from experiments.results import Results
+from experiments.stats import Group, group
+from experiments.tables import count, markdown, number
+
+ONE, CHANGING = "one command", "new commands"
+
+
+@dataclass(frozen=True)
+class CommandOptions(ExpertOptions):
+    """Drawn commands.
+
+    Attributes:
+        episodes: per gait.
+        seconds: duration of each [s].
+        change_s: time between changing commands [s].
+    """
+
+    episodes: int = 20
+    seconds: float = 30.0
+    change_s: float = 5.0
+
+
+class Commands(ExpertStudy):
+    """Drawn commands, kept and changing, as policies are measured."""
+
+    name = "expert_commands"
+    title = "Drawn commands"
+    full = CommandOptions()
+    quick = CommandOptions(("trot", "jump"), episodes=1, seconds=3.0, change_s=2.0)
+
+    def measure_in(self, lab: Lab, task: str, seed: int) -> list[dict[str, Any]]:
+        """One record per episode."""
+        options, records = self.options, []
+        for condition, interval in ((ONE, None), (CHANGING, options.change_s)):
+            result = lab.score(task, options.seconds, seed, options.episodes, command_interval=interval)
+            records += [{"condition": condition, **episode(own)} for own in result.episodes]
+        return records
+
+    def table(self, results: Results) -> str:
+        """Metrics of episodes with one command."""
+        return closed_loop_table(group(results.of(condition=ONE), "task"))
+
+    def paragraphs(self, results: Results) -> list[str]:
+        """Both kinds of commands."""
+        changing = closed_loop_table(group(results.of(condition=CHANGING), "task"))
+        return [self.table(results), "The same with commands that change:", changing]
+
+
+def episode(record: Any) -> dict[str, Any]:
+    """The metrics of an episode, see `trainers.EpisodeRecord`."""
+    return {
+        "trials": 1,
+        "survived": int(not record.fallen),
+        "succeeded": int(record.success),
+        "velocity_error": record.velocity_error,
+        "yaw_rate_error": record.yaw_rate_error,
+        "step_rate": float(np.mean(record.step_rate)),
+        "survival_s": record.survival_s,
+        "episode_seed": record.seed,
+        "command": record.commands[0],
+        "step_rates": record.step_rate,
+    }
+
+
+def closed_loop_table(gaits: Mapping[str, Group]) -> str:
+    """One row per gait."""
+    columns = {
+        "velocity error [m/s]": ("velocity_error", ".3f"),
+        "yaw rate error [rad/s]": ("yaw_rate_error", ".3f"),
+        "steps/s": ("step_rate", ".2f"),
+    }
+    rows = [
+        [
+            gait,
+            count(own.rate()),
+            count(own.rate("survived")),
+            *(number(own.mean(k), how) for k, how in columns.values()),
+        ]
+        for gait, own in gaits.items()
+    ]
+    return markdown(["gait", "success", "survival", *columns], rows)

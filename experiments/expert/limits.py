@@ -1,0 +1,235 @@
+"""How far the expert goes: the largest command along each axis, and the largest push at every phase of the cycle."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from experiments import plots
+from experiments.expert.lab import ExpertOptions, ExpertStudy, Lab, generator
+from experiments.pushing import CRUISE, DIRECTIONS, push_w
+from experiments.results import Results, distinct
+from experiments.searches import climb_from, scouted
+from experiments.stats import group
+from experiments.tables import markdown, number
+from go1_mtl_gym import TASKS
+from trainers.data.environments import derive_seed
+
+AXES = {
+    "vx": (0, (1.0,), 0.2, 2.5),
+    "-vx": (0, (-1.0,), 0.2, 2.5),
+    "vy": (1, (1.0, -1.0), 0.1, 1.0),
+    "yaw": (2, (1.0, -1.0), 0.5, 3.0),
+}
+"""Axis -> its place in the command, the signs tried in turn, step of the grid and largest value [m/s, rad/s]."""
+OTHERS = (0.3, 0.1, 0.2)
+"""Largest |vx|, |vy| [m/s], |yaw rate| [rad/s] drawn for the two components that are not being tested."""
+TRACKED = (0.15, 0.3)
+"""Mean velocity error [m/s] and mean yaw rate error [rad/s] up to which a command counts as tracked."""
+Errors = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class LimitOptions(ExpertOptions):
+    """The search for the largest command.
+
+    Attributes:
+        trials: episodes that must all survive.
+        scouts: episodes tried on the way up, before the whole number is tried on the way down.
+        seconds: duration of an episode [s].
+        grid: largest number of steps above the task's own range.
+        axes: which of `AXES`.
+    """
+
+    trials: int = 20
+    scouts: int = 2
+    seconds: float = 10.0
+    grid: int = 100
+    axes: tuple[str, ...] = tuple(AXES)
+
+
+class Limits(ExpertStudy):
+    """The largest command along each axis that the expert survives, and that it tracks."""
+
+    name = "expert_limits"
+    title = "Largest commands"
+    note = (
+        "The largest command along an axis that every trial survived, the errors there, and the largest that was also "
+        f"tracked: mean errors of at most {TRACKED[0]:g} m/s and {TRACKED[1]:g} rad/s."
+    )
+    caption = "Largest command along each axis"
+    full = LimitOptions()
+    quick = LimitOptions(("trot",), trials=1, scouts=1, seconds=2.5, grid=1, axes=("vx", "yaw"))
+    code = (*ExpertStudy.code, "experiments.searches")
+
+    def measure_in(self, lab: Lab, task: str, seed: int) -> list[dict[str, Any]]:
+        """One record per axis."""
+        return [{"condition": axis, **self._search(lab, task, axis, seed)} for axis in self.options.axes]
+
+    def _search(self, lab: Lab, task: str, axis: str, seed: int) -> dict[str, Any]:
+        """See `searches.scouted`.
+
+        Returns:
+            "survived_to": the largest value with no fall in all trials, with its mean errors; "tracked_to": the
+            largest that was also tracked; 0 if there is none. "at_cap": whether there was no larger one to try.
+        """
+        options, (index, _, step, cap) = self.options, AXES[axis]
+        start = TASKS[task].command_range[index]
+        levels = [min(start + k * step, cap) for k in range(options.grid + 1) if start + (k - 1) * step < cap - 1e-9]
+        levels = sorted({round(level, 6) for level in levels})
+        below = [round(start - k * step, 6) for k in range(1, 100) if start - k * step > 1e-6]
+
+        def errors(level: float, trials: int) -> Errors | None:
+            return episodes(lab, task, axis, level, trials, options.seconds, seed)
+
+        survived, tracked = scouted(
+            levels,
+            below,
+            scout=lambda level: errors(level, options.scouts) is not None,
+            try_all=lambda level: errors(level, options.trials),
+            good=lambda own: own[0] <= TRACKED[0] and own[1] <= TRACKED[1],
+        )
+        level, (velocity, yaw_rate) = survived or (0.0, (None, None))
+        at_cap = survived is not None and level == levels[-1]
+        means = {"velocity_error": velocity, "yaw_rate_error": yaw_rate}
+        return {"survived_to": level, "tracked_to": tracked, **means, "at_cap": at_cap}
+
+    def table(self, results: Results) -> str:
+        """Per gait and axis."""
+        rows = []
+        for own in results.records:
+            errors = [number(own[name], ".3f") for name in ("velocity_error", "yaw_rate_error")]
+            survived = f"{own['survived_to']:g}{' (end of the search)' if own['at_cap'] else ''}"
+            rows.append([own["task"], own["condition"], survived, *errors, f"{own['tracked_to']:g}"])
+        header = [
+            "gait",
+            "axis",
+            "survived",
+            "velocity error there [m/s]",
+            "yaw rate error there [rad/s]",
+            "and tracked",
+        ]
+        return markdown(header, rows, text_columns=2)
+
+    def figure(self, results: Results) -> Figure:
+        """A panel per axis, a bar per gait."""
+        titles = {"vx": "forward [m/s]", "-vx": "backward [m/s]", "vy": "sideways [m/s]", "yaw": "yaw rate [rad/s]"}
+        axes_shown, gaits = group(results.records, "condition"), distinct(results.records, "task")
+        figure = plots.new_figure(3.0 * len(axes_shown) + 0.6, 0.36 * len(gaits) + 1.5)
+        axes = figure.subplots(1, len(axes_shown), sharey=True, squeeze=False)[0]
+        for ax, (axis, members) in zip(axes, axes_shown.items()):
+            rows = [gaits.index(own["task"]) for own in members]
+            ax.barh(rows, members.values("survived_to"), height=0.7, color="#a6c8e4", label="survived")
+            ax.barh(rows, members.values("tracked_to"), height=0.4, color=plots.BLUE, label="and tracked")
+            ax.set_title(titles[axis], fontsize=10)
+            ax.set_yticks(range(len(gaits)), gaits)
+            ax.set_xlim(left=0)
+        axes[0].invert_yaxis()
+        plots.legend(figure, axes)
+        return figure
+
+
+def episodes(lab: Lab, task: str, axis: str, level: float, trials: int, seconds: float, seed: int) -> Errors | None:
+    """Mean velocity error [m/s] and yaw rate error [rad/s] over some episodes, or None at the first fall."""
+    index, signs, _, _ = AXES[axis]
+    small, errors = np.minimum(OTHERS, TASKS[task].command_range), []
+    for i in range(trials):
+        command = generator("limits", task, axis, seed, i).uniform(-1, 1, 3) * small
+        command[index] = signs[i % len(signs)] * level
+        result = lab.score(task, seconds, derive_seed("limits", axis, seed, i), command=command)
+        if result.episodes[0].fallen:
+            return None
+        errors.append((result.velocity_error, result.yaw_rate_error))
+    velocity, yaw_rate = np.mean(errors, axis=0)
+    return float(velocity), float(yaw_rate)
+
+
+# -- Pushes ------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class PushOptions(ExpertOptions):
+    """The search for the largest push.
+
+    Attributes:
+        phases: of the cycle, evenly spaced, at each of which the push must be survived.
+        first, step: grid of pushes [m/s]; below the first one it is searched downward.
+        grid: largest number of steps above the first.
+        before_s, after_s: walking before the push, and without a fall after it [s].
+        directions: which of `DIRECTIONS`.
+    """
+
+    phases: int = 8
+    first: float = 0.6
+    step: float = 0.1
+    grid: int = 40
+    before_s: float = 1.5
+    after_s: float = 3.0
+    directions: tuple[str, ...] = tuple(DIRECTIONS)
+
+
+class Pushes(ExpertStudy):
+    """The largest push that the expert survives at every phase of the cycle, per direction."""
+
+    name = "expert_pushes"
+    title = "Pushes"
+    note = "Largest change of the base's velocity that is survived at every phase of the cycle, walking at 0.3 m/s."
+    caption = "Largest push survived at every phase of the cycle"
+    full = PushOptions()
+    quick = PushOptions(("trot",), phases=1, grid=1, after_s=0.5, directions=("left", "forward"))
+    code = (*ExpertStudy.code, "experiments.pushing", "experiments.searches")
+
+    def measure_in(self, lab: Lab, task: str, seed: int) -> list[dict[str, Any]]:
+        """One record per direction."""
+        found = {
+            direction: largest_push(lab, task, direction, self.options, seed) for direction in self.options.directions
+        }
+        return [{"condition": direction, "largest": largest} for direction, largest in found.items()]
+
+    def table(self, results: Results) -> str:
+        """Per gait, in every direction [m/s]."""
+        rows = []
+        for gait, members in group(results.records, "task").items():
+            largest = {own["condition"]: own["largest"] for own in members}
+            rows.append([gait, *(number(largest.get(name), ".1f") for name in DIRECTIONS)])
+        return markdown(["gait", *(f"{name} [m/s]" for name in DIRECTIONS)], rows)
+
+    def figure(self, results: Results) -> Figure:
+        """A panel per gait, a bar per direction."""
+        gaits = group(results.records, "task")
+        figure = plots.new_figure(2.1 * len(gaits) + 1.2, 3.1)
+        axes = figure.subplots(1, len(gaits), sharey=True, squeeze=False)[0]
+        for ax, (gait, members) in zip(axes, gaits.items()):
+            names = distinct(members, "condition")
+            bars = ax.bar(range(len(names)), members.values("largest"), color=plots.BLUE, width=0.7)
+            ax.bar_label(bars, fmt="%.1f", fontsize=8, padding=1)
+            ax.set_xticks(range(len(names)), names, rotation=40, ha="right", fontsize=9)
+            ax.set_title(gait, fontsize=10)
+        axes[0].set_ylabel("largest push survived [m/s]")
+        axes[0].margins(y=0.15)
+        return figure
+
+
+def largest_push(lab: Lab, task: str, direction: str, options: PushOptions, seed: int) -> float:
+    """Largest push on the grid below the first that made the robot fall at some phase [m/s]; 0 if all do."""
+
+    def passes(size: float) -> bool:
+        return all(survives(lab, task, direction, size, k, options, seed) for k in range(options.phases))
+
+    return climb_from(options.first, options.step, options.grid, passes)
+
+
+def survives(lab: Lab, task: str, direction: str, size: float, k: int, options: PushOptions, seed: int) -> bool:
+    """Whether one push [m/s], as the gait clock passes phase k / phases, is survived."""
+    lab.begin(task, CRUISE, direction, seed, k)
+    if not lab.walk(options.before_s):
+        return False
+    wanted, per_step = k / options.phases, lab.env.control_s / TASKS[task].gait.period
+    for _ in range(round(1 / per_step) + 1):
+        if (lab.env.state.phase - wanted + 1e-9) % 1.0 < per_step:
+            break
+        if lab.step()["fallen"]:
+            return False
+    lab.env.push(push_w(direction, size, lab.env.state.rpy[2]))
+    return lab.walk(options.after_s)

@@ -1,0 +1,247 @@
+"""How fast the expert is: milliseconds per answer, multiples of real time, and what its other settings buy and cost."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from experiments.agents import Agent
+from experiments.expert.lab import ExpertOptions, ExpertStudy, Lab
+from experiments.expert.limits import PushOptions, largest_push
+from experiments.pushing import CRUISE
+from experiments.results import Results
+from experiments.stats import Group, group
+from experiments.tables import count, markdown, number
+from experts import NMPCConfig, NMPCExpert
+from experts.nmpc import WHOLE_BODY
+from go1_mtl_gym.actuation import PHYSICS_HZ
+from go1_mtl_gym.sensing.state import RobotState
+
+SETTINGS = {
+    "default": NMPCConfig(),
+    "one QP per call": NMPCConfig(sqp_iterations=1),
+    "real-time iterations": NMPCConfig(sqp_iterations=1, linearization="shifted"),
+    "converged SQP": NMPCConfig(sqp_iterations=20, sqp_tolerance=1e-3),
+} | {f"whole body: {name}": NMPCConfig(whole_body=name) for name in WHOLE_BODY if name != NMPCConfig().whole_body}
+"""Settings of the expert that are compared with each other, by name."""
+MPC_HZ = 100
+"""Where control is faster than this, forces are planned at this rate, the whole body at every step [Hz]."""
+COMPARED = ("trot", "jump")
+"""Gaits on which settings are compared."""
+UPDATE, ACTION, COMPARED_ACTION, REAL_TIME = "MPC update", "action", "action, settings compared", "real time"
+
+
+def make_expert(name: str) -> Callable[..., Any]:
+    """What makes an expert with the settings of that name, for the environment's argument `expert`."""
+    return partial(NMPCExpert, config=SETTINGS[name])
+
+
+# -- Time --------------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class TimingOptions(ExpertOptions):
+    """Measuring time, alone on a core.
+
+    Attributes:
+        states: along a walk, at each of which the expert is asked.
+        rates: of control, at which the multiple of real time is measured [Hz].
+        blocks: repetitions, of which the median counts.
+        block_s: simulated time of a block [s].
+    """
+
+    states: int = 500
+    rates: tuple[int, ...] = (50, 1000)
+    blocks: int = 7
+    block_s: float = 1.0
+
+
+class Timing(ExpertStudy):
+    """Milliseconds per answer of the expert and of its other settings, and multiples of real time."""
+
+    name = "expert_timing"
+    title = "Time"
+    note = f"Where control is faster than {MPC_HZ} Hz, forces are planned at that rate."
+    full = TimingOptions()
+    quick = TimingOptions(("trot",), states=10, rates=(50,), blocks=1, block_s=0.2)
+    alone = True
+
+    def measure_in(self, lab: Lab, task: str, seed: int) -> list[dict[str, Any]]:
+        """Times of an action, of the MPC update in it and of each other setting's action; multiples of real time."""
+        states = walked_states(lab, task, self.options.states, seed)
+        labs = {name: Lab(lab.env.control_hz, make_expert(name)) for name in SETTINGS if task in COMPARED}
+        for own in labs.values():
+            own.begin(task, CRUISE, "timing", seed)
+            own.walk(0.1)
+        calls = {UPDATE: partial(mpc_update, lab.counted.expert), ACTION: lab.counted.action}
+        calls |= {name: own.counted.action for name, own in labs.items()}
+        times = {name: quantiles(seconds) for name, seconds in interleaved(calls, states).items()}
+        for own in labs.values():
+            lab.ledger.add(own.settle())
+        return [
+            *({"condition": name, **times[name]} for name in (UPDATE, ACTION)),
+            *({"agent": name, "condition": COMPARED_ACTION, **times[name]} for name in labs),
+            *(
+                {"condition": REAL_TIME, **real_time(lab, task, rate, self.options, seed)}
+                for rate in self.options.rates
+            ),
+        ]
+
+    def table(self, results: Results) -> str:
+        """Milliseconds per answer and multiples of real time."""
+        rows = []
+        for gait, members in group(results.records, "task").items():
+            of = group(members, "condition")
+            times = [f"{of[name][0][key]:.2f}" for name in (UPDATE, ACTION) for key in ("median_ms", "p99_ms")]
+            for own in of[REAL_TIME]:
+                factors = [f"{own[name]:.1f}" for name in ("expert", "environment", "physics")]
+                rows.append([gait, f"{own['control_hz']} Hz", *times, *factors, f"{own['expert_to_physics']:.3f}"])
+        header = ["gait", "control", "MPC update [ms]", "p99", "action [ms]", "p99", "expert x real time"]
+        return markdown([*header, "environment x", "MuJoCo x", "expert / MuJoCo"], rows, text_columns=2)
+
+    def paragraphs(self, results: Results) -> list[str]:
+        """Times, and those of the settings that are compared."""
+        compared = group(results.of(condition=COMPARED_ACTION), "agent")
+        gaits = list(dict.fromkeys(own["task"] for members in compared.values() for own in members))
+        rows = [[name, *(f"{own['median_ms']:.2f}" for own in members)] for name, members in compared.items()]
+        table = markdown(["action [ms]", *gaits], rows)
+        return [*super().paragraphs(results), "Median time of an action with other settings:", table]
+
+
+def walked_states(lab: Lab, task: str, count: int, seed: int) -> list[RobotState]:
+    """States of successive control steps at `CRUISE`."""
+    lab.begin(task, CRUISE, "timing", seed)
+    states = []
+    for _ in range(count):
+        states.append(lab.env.state)
+        lab.step()
+    return states
+
+
+def mpc_update(expert: Any, state: RobotState) -> float:
+    """Seconds that the MPC proper takes: from a state and its dynamics to ground forces (build, update and solve)."""
+    dynamics = expert._model.dynamics(state)
+    return elapsed(partial(expert.forces, state, dynamics))
+
+
+def elapsed(call: Callable[[], Any]) -> float:
+    """Seconds that a call takes."""
+    start = time.perf_counter()
+    call()
+    return time.perf_counter() - start
+
+
+def interleaved(calls: dict[str, Callable[[RobotState], Any]], states: Sequence[RobotState]) -> dict[str, np.ndarray]:
+    """Seconds of every call at every state, the calls taking turns; a call that returns a float has timed itself."""
+    times = {name: np.empty(len(states)) for name in calls}
+    for i, state in enumerate(states):
+        for name, call in calls.items():
+            start = time.perf_counter()
+            result = call(state)
+            times[name][i] = result if isinstance(result, float) else time.perf_counter() - start
+    return times
+
+
+def quantiles(seconds: np.ndarray) -> dict[str, float]:
+    """Median and 99th percentile in milliseconds."""
+    return {"median_ms": float(1e3 * np.median(seconds)), "p99_ms": float(1e3 * np.quantile(seconds, 0.99))}
+
+
+def real_time(lab: Lab, task: str, rate: int, options: TimingOptions, seed: int) -> dict[str, float]:
+    """Simulated seconds per second of one core at a control rate, medians of blocks that take turns.
+
+    The expert plans forces at most at `MPC_HZ`.
+
+    Returns:
+        "expert" in the loop; "environment", the same without the expert, standing; "physics", MuJoCo alone; and
+        "expert_to_physics", which depends less on the machine.
+    """
+    slower = NMPCConfig(mpc_hz=MPC_HZ if rate > MPC_HZ else None)
+    walking, standing = Lab(rate, partial(NMPCExpert, config=slower)), Lab(rate)
+    for used in (walking, standing):
+        used.begin(task, CRUISE, "timing", seed)
+    walking.walk(0.5)
+    simulation, steps = standing.env.simulation, round(options.block_s * rate)
+    home = standing.env.action_map.from_radians(simulation.q)
+
+    def expert() -> None:
+        for _ in walking.drive(options.block_s):
+            pass
+
+    def environment() -> None:
+        for _ in range(steps):
+            standing.env.step(home)
+
+    def physics() -> None:
+        for _ in range(steps):
+            mujoco.mj_step(simulation.model, simulation.data, nstep=PHYSICS_HZ // rate)
+
+    calls = {"expert": expert, "environment": environment, "physics": physics}
+    blocks = [{name: elapsed(call) for name, call in calls.items()} for _ in range(options.blocks)]
+    factors = {name: float(options.block_s / np.median([block[name] for block in blocks])) for name in calls}
+    lab.ledger.add(walking.settle())
+    return {"control_hz": rate} | factors | {"expert_to_physics": factors["expert"] / factors["physics"]}
+
+
+# -- Settings ----------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class SettingsOptions(ExpertOptions):
+    """Comparing `SETTINGS`.
+
+    Attributes:
+        episodes, seconds: of drawn commands.
+        push: how the largest push to the side is searched.
+    """
+
+    tasks: tuple[str, ...] = COMPARED
+    episodes: int = 5
+    seconds: float = 10.0
+    push: PushOptions = PushOptions(directions=("left", "right"))
+
+
+class Settings(ExpertStudy):
+    """What other settings of the expert buy and cost."""
+
+    name = "expert_settings"
+    title = "Settings compared"
+    full = SettingsOptions()
+    quick = SettingsOptions(("trot",), 50, 1, 2.5, PushOptions(phases=1, grid=0, after_s=0.5, directions=("left",)))
+    code = (*ExpertStudy.code, "experiments.pushing", "experiments.searches")
+
+    def agents(self) -> list[Agent]:
+        return [Agent(name) for name in SETTINGS]
+
+    def measure(self, agent: Agent, cell: Any, seed: int) -> dict[str, Any]:
+        """Survival and velocity error [m/s] with drawn commands, and the largest push to the side [m/s]."""
+        options, lab = self.options, Lab(self.options.control_hz, make_expert(agent.name))
+        walked = lab.score(cell.task, options.seconds, seed, options.episodes)
+        pushes = [largest_push(lab, cell.task, direction, options.push, seed) for direction in options.push.directions]
+        survived = sum(not episode.fallen for episode in walked.episodes)
+        counts = {"trials": options.episodes, "survived": survived, "velocity_error": walked.velocity_error}
+        return counts | {"lateral_push": min(pushes)} | vars(lab.settle())
+
+    def measure_in(self, lab: Lab, task: str, seed: int) -> list[dict[str, Any]]:
+        """Not used: every agent has a lab of its own."""
+        raise NotImplementedError
+
+    def table(self, results: Results) -> str:
+        """One row per gait and settings."""
+        rows = []
+        for (task, agent), own in sorted_by_task(results):
+            values = [number(own.mean("velocity_error"), ".3f"), number(own.mean("lateral_push"), ".1f")]
+            rows.append([task, agent, count(own.rate("survived")), *values])
+        header = ["gait", "settings", "survived", "velocity error [m/s]", "push to the side [m/s]"]
+        return markdown(header, rows, text_columns=2)
+
+
+def sorted_by_task(results: Results) -> list[tuple[tuple[str, str], Group]]:
+    """((task, agent), records), the tasks one after the other."""
+    found = group(results.records, ["task", "agent"])
+    tasks = list(dict.fromkeys(task for task, _ in found))
+    return sorted(found.items(), key=lambda item: tasks.index(item[0][0]))

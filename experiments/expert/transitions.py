@@ -1,0 +1,128 @@
+"""Changes of gait while walking, and a long walk in which everything changes at once."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from experiments import plots
+from experiments.expert.lab import ExpertOptions, ExpertStudy, Lab, generator, shared_range
+from experiments.results import Results, distinct
+from experiments.stats import group
+from experiments.student.transitions import transition_rates
+from experiments.tables import count, markdown
+from go1_mtl_gym import TASKS
+
+
+@dataclass(frozen=True)
+class TransitionOptions(ExpertOptions):
+    """Changes of gait while walking.
+
+    Attributes:
+        trials: per ordered pair of gaits.
+        before_s: walking in the first gait [s]; a random part of its period is added.
+        after_s: walking in the second gait [s].
+    """
+
+    trials: int = 20
+    before_s: float = 2.0
+    after_s: float = 4.0
+
+
+class Transitions(ExpertStudy):
+    """Changes of gait between every ordered pair that the expert survives."""
+
+    name = "expert_transitions"
+    title = "Gait transitions"
+    note = "Survived changes of gait, from this gait to all others."
+    caption = "Survived gait transitions"
+    full = TransitionOptions()
+    quick = TransitionOptions(("trot", "jump"), trials=1, after_s=1.0)
+
+    def measure_in(self, lab: Lab, task: str, seed: int) -> list[dict[str, Any]]:
+        """One record per gait that is changed to; a fall before the change is not a trial."""
+        options, records = self.options, []
+        for target in (name for name in options.tasks if name != task):
+            survived = trials = 0
+            for i in range(options.trials):
+                rng = generator("transitions", task, target, seed, i)
+                lab.begin(task, rng.uniform(-1, 1, 3) * shared_range(task, target), target, seed, i)
+                if not lab.walk(options.before_s + rng.uniform() * TASKS[task].gait.period):
+                    continue
+                lab.env.set_task(target)
+                trials += 1
+                survived += lab.walk(options.after_s)
+            records.append({"condition": f"to {target}", "trials": trials, "survived": survived})
+        return records
+
+    def table(self, results: Results) -> str:
+        """Per gait that is left."""
+        rows = [[gait, count(own.rate("survived"))] for gait, own in group(results.records, "task").items()]
+        return markdown(["from", "survived"], rows)
+
+    def figure(self, results: Results) -> Figure:
+        """A square per pair, from the row's gait to the column's."""
+        gaits = distinct(results.records, "task")
+        figure = plots.new_figure(1.6 + 0.75 * len(gaits), 1.3 + 0.62 * len(gaits))
+        ax = figure.subplots()
+        image = plots.transition_matrix(ax, gaits, transition_rates(results, "survived")["expert"])
+        ax.set_title("Survived gait transitions")
+        figure.colorbar(image, ax=ax, shrink=0.85, label="fraction")
+        return figure
+
+
+@dataclass(frozen=True)
+class LongWalkOptions(ExpertOptions):
+    """A long walk in which everything changes.
+
+    Attributes:
+        steps: control steps per gait that it begins with.
+        command_s: time between new commands [s].
+        transition_s: mean time between changes of gait [s].
+        push_s: mean time between pushes [s].
+        push: largest change of the base's velocity [m/s].
+    """
+
+    steps: int = 35_000
+    command_s: float = 2.0
+    transition_s: float = 5.0
+    push_s: float = 3.0
+    push: float = 0.5
+
+
+class LongWalk(ExpertStudy):
+    """Random commands, changes of gait and pushes at once, for hundreds of thousands of steps."""
+
+    name = "expert_long_walk"
+    title = "The long walk"
+    note = "Random commands, gait transitions and pushes at once."
+    full = LongWalkOptions()
+    quick = LongWalkOptions(("trot", "jump"), steps=100)
+
+    def measure_in(self, lab: Lab, task: str, seed: int) -> list[dict[str, Any]]:
+        """Walk until the steps are used up; a fall begins a new episode."""
+        options, hz, rng = self.options, lab.env.control_hz, generator("soak", task, seed)
+        span, steps, falls, transitions, pushes, fallen = shared_range(*options.tasks), 0, 0, 0, 0, True
+        while steps < options.steps:
+            if fallen:
+                lab.begin(task, rng.uniform(-1, 1, 3) * span, seed, steps)
+                since = 0
+            if since and since % round(options.command_s * hz) == 0:
+                lab.env.set_command(rng.uniform(-1, 1, 3) * span)
+            if rng.uniform() * options.transition_s * hz < 1:
+                lab.env.set_task(str(rng.choice(options.tasks)))
+                transitions += 1
+            if rng.uniform() * options.push_s * hz < 1:
+                size, angle = options.push * np.sqrt(rng.uniform()), rng.uniform(0, 2 * np.pi)
+                lab.env.push((size * np.cos(angle), size * np.sin(angle), 0.0))
+                pushes += 1
+            fallen = lab.step()["fallen"]
+            steps, since, falls = steps + 1, since + 1, falls + fallen
+        return [{"steps": steps, "transitions": transitions, "pushes": pushes, "falls": falls}]
+
+    def table(self, results: Results) -> str:
+        """Steps and falls per gait that a walk began in."""
+        names = ("steps", "transitions", "pushes", "falls")
+        rows = [[own["task"], *(str(own[name]) for name in names)] for own in results.records if "steps" in own]
+        return markdown(["begun in", "control steps", "gait transitions", "pushes", "falls"], rows)

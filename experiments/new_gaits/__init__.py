@@ -1,0 +1,1 @@
+"""New gaits for a trained policy."""

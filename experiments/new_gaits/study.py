@@ -1,0 +1,242 @@
+"""Pace and gallop for a trained policy, by seconds of demonstrations and by the way of learning them."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+import trainers
+from experiments import plots
+from experiments.agents import EXPERT, Agent, PolicyFile, shipped
+from experiments.new_gaits.learning import (
+    METHODS,
+    SCRATCH,
+    TUNED,
+    GaitTraining,
+    NewGaitOptions,
+    changes,
+    demonstrations,
+    held_out,
+    rehearsal,
+)
+from experiments.results import Results
+from experiments.stats import Group, group
+from experiments.student.episodes import counts
+from experiments.study import ALL_GAITS, Cell, Metrics, Study
+from experiments.tables import count, markdown, number, percent
+from experiments.training_runs import collect, rows_of
+from go1_mtl_gym import TASKS
+from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.validation import one_of
+from trainers.pipeline.config import JobConfig
+
+NEW, OLD, BEFORE = "new gait", "old gait", "policy, before"
+COLORS = dict(zip(METHODS, (plots.BLUE, plots.PURPLE, plots.GREEN, plots.RED), strict=True))
+QUICK_JOB = JobConfig(
+    n_envs=1,
+    clean_s=3.0,
+    perturbed_s=3.0,
+    shard_s=2.0,
+    held_out_s=2.0,
+    batch_size=256,
+    clone_steps=40,
+    episodes=1,
+    episode_s=2.5,
+)
+
+
+class NewGaits(Study):
+    """A head on a frozen trunk, all of the policy tuned with rehearsal, or a network of its own."""
+
+    name = "new_gaits"
+    title = "A new head, tuning, or another network"
+    note = (
+        "Success (survival) and R2 on held-out rows by seconds of demonstrations, all training seeds together; the "
+        "velocity error is that of the most. From `all survive from` on no episode ends in a fall. The last column "
+        "says what became of the gaits that the policy had: of their actions, and of their success."
+    )
+    caption = "Survival and R2 of new gaits by seconds of demonstrations"
+    full = NewGaitOptions()
+    quick = NewGaitOptions(("pace",), QUICK_JOB, (2.0, 4.0), (0,), rehearsal_s=2.0, old_episodes=1)
+    code = (*Study.code, "experiments.new_gaits.learning", "experiments.training_runs")
+    takes_policies = True
+
+    @property
+    def base(self) -> PolicyFile:
+        """The trained policy.
+
+        Raises:
+            InvalidInputError: if several are given.
+        """
+        if len(self.policies) > 1:
+            raise InvalidInputError(f"one policy was expected, got {[agent.name for agent in self.policies]}")
+        return self.policies[0] if self.policies else shipped(BEFORE, "clocked")
+
+    def agents(self) -> list[Agent]:
+        """The methods, the expert, and the policy as it was.
+
+        Raises:
+            InvalidInputError: if the policy has no heads, sees several frames, or a gait is not new to it.
+        """
+        policy = self.base.load()
+        heads = isinstance(policy, trainers.MultiHeadPolicy) and not policy.pooled
+        if not heads or policy.contract.history != 1:
+            raise InvalidInputError(f"expected a policy with a head per gait that sees one frame, got {self.base.path}")
+        for gait in self.options.gaits:
+            one_of(gait, [name for name in TASKS if name not in policy.tasks], "a gait that is new to the policy")
+        kwargs = {"base": self.base.sha256}
+        return [Agent(EXPERT, env_kwargs=kwargs), *(Agent(name, env_kwargs=kwargs) for name in (BEFORE, *METHODS))]
+
+    def cells(self, agent: Agent) -> list[Cell]:
+        options = self.options
+        if agent.name == BEFORE:
+            return [Cell(ALL_GAITS, OLD)]
+        if agent.name == EXPERT:
+            return [Cell(gait, NEW) for gait in options.gaits]
+        budgets = [f"{seconds:g} s" for seconds in reversed(options.demonstrations_s)]
+        return [Cell(gait, budget, seed) for budget in budgets for gait in options.gaits for seed in options.seeds]
+
+    def prepare(self, n_jobs: int) -> None:
+        options, base, jobs = self.options, self.base.load(), []
+        for gait in options.gaits:
+            seeds = [options.job_of(base, (gait,), seed) for seed in options.seeds]
+            jobs += [job for own in seeds for job in demonstrations(own, options.demonstrations_s[-1])]
+            jobs += held_out(base, gait, options)
+        collect(jobs, self.folder, n_jobs)
+        rehearsal(base, options, self.folder)
+
+    def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:
+        """Train and evaluate, or evaluate who others are compared with.
+
+        Returns:
+            Of a training: counts in the new gait with "survival_s" [s], "step_rate" [1/s], the one-step errors on
+            held-out rows, and `changes` of the old gaits if the policy has them; and a record per old gait if they
+            could have changed.
+        """
+        options, base = self.options, self.base.load()
+        if agent.name == EXPERT:
+            env_kwargs = options.job_of(base, (cell.task,), 0).env_kwargs
+            return self._walk(EXPERT, cell.task, options.job.episodes, seed, **env_kwargs)
+        if agent.name == BEFORE:
+            return self._old_gaits(base, base.tasks, OLD, seed)
+        demonstrations_s = float(cell.condition.split()[0])
+        training = GaitTraining(base, cell.task, agent.name, demonstrations_s, cell.seed, options, self.folder)
+        policy = training.policy()
+        rows = rows_of(held_out(base, cell.task, options), self.folder).with_tasks(policy.tasks)
+        record = {"condition": NEW, "demonstrations_s": demonstrations_s}
+        record |= self._walk(policy, cell.task, options.job.episodes, seed)
+        record |= trainers.offline_metrics(policy, rows)[cell.task]
+        if agent.name != SCRATCH:
+            record |= changes(base, policy, rehearsal(base, options, self.folder))
+        if agent.name != TUNED:
+            return record
+        old = self._old_gaits(policy, base.tasks, f"{OLD}, after {cell.task}", seed)
+        return [record, *({"demonstrations_s": demonstrations_s} | own for own in old)]
+
+    def _walk(self, policy: Any, gait: str, episodes: int, seed: int, **env_kwargs: Any) -> dict[str, Any]:
+        """Closed loop under commands that change."""
+        job = self.options.job
+        result = trainers.evaluate(
+            policy, gait, episodes, job.episode_s, seed, command_interval=job.command_interval, **env_kwargs
+        )
+        return counts(result) | {"survival_s": result.survival_s, "step_rate": result.step_rate}
+
+    def _old_gaits(self, policy: Any, tasks: Sequence[str], condition: str, seed: int) -> list[dict[str, Any]]:
+        episodes = self.options.old_episodes
+        return [{"task": task, "condition": condition, **self._walk(policy, task, episodes, seed)} for task in tasks]
+
+    def table(self, results: Results) -> str:
+        """One row per gait and method, and a sentence on those that they are compared with."""
+        rows, budgets = [], []
+        for gait, methods in _by_method(results).items():
+            for method, levels in methods.items():
+                budgets = [f"{seconds:g} s" for seconds in levels]
+                cells = [
+                    f"{percent(own.rate())} ({percent(own.rate('survived'))}) {own.mean('r2'):.4f}"
+                    for own in levels.values()
+                ]
+                least, (seconds, last) = enough(levels), list(levels.items())[-1]
+                after = results.of(agent=method, condition=f"{OLD}, after {gait}", demonstrations_s=seconds)
+                members = Group(own for level in levels.values() for own in level)
+                error = number(last.mean("velocity_error"), ".3f")
+                all_survive = "-" if least is None else f"{least:g} s"
+                rows.append([gait, method, *cells, all_survive, error, old_cell(members, Group(after))])
+        header = ["gait", "learned", *budgets, "all survive from", "velocity error [m/s]", "old gaits"]
+        expert = [f"{count(Group([own]).rate())} of {own['task']}" for own in results.of(agent=EXPERT)]
+        before = count(Group(results.of(agent=BEFORE)).rate())
+        return "\n\n".join(
+            [
+                markdown(header, rows, text_columns=2),
+                f"The expert succeeds in {', '.join(expert)}; the policy, before, in {before} of its own gaits.",
+            ]
+        )
+
+    def figure(self, results: Results) -> Figure:
+        """Per gait: survival and success by seconds of demonstrations, and what is left to explain of the actions."""
+        gaits = _by_method(results)
+        figure = plots.new_figure(9.6, 2.9 * len(gaits) + 0.3)
+        axes = figure.subplots(len(gaits), 2, sharex=True, squeeze=False)
+        for (shares, errors), (gait, methods) in zip(axes, gaits.items()):
+            for method, levels in methods.items():
+                _draw(shares, errors, method, levels)
+            shares.set_title(gait, loc="left", fontsize=10)
+            shares.set_ylabel("survival (solid), success (dashed)", fontsize=9)
+            plots.shares(shares)
+            errors.set_ylabel("1 - R2, held out", fontsize=9)
+            errors.set_yscale("log")
+        for ax in axes[-1]:
+            plots.log_ticks(ax, list(levels), "demonstrations of the new gait [s]")
+        plots.legend(figure, axes[0, :1])
+        return figure
+
+
+def _by_method(results: Results) -> dict[str, dict[str, dict[float, Group]]]:
+    """{gait: {method: {seconds of demonstrations, rising: records of all seeds}}}."""
+    members = Group(own for own in results.of(condition=NEW) if own["agent"] != EXPERT)
+    return {
+        gait: {
+            method: dict(sorted(group(records, "demonstrations_s").items()))
+            for method, records in group(own, "agent").items()
+        }
+        for gait, own in group(members, "task").items()
+    }
+
+
+def enough(levels: Mapping[float, Group]) -> float | None:
+    """The fewest seconds from which on, at every budget, all episodes survive; None if there are none.
+
+    Args:
+        levels: records by seconds, rising.
+    """
+    least = None
+    for seconds, own in reversed(levels.items()):
+        if own.total("survived") < own.total("trials"):
+            break
+        least = seconds
+    return least
+
+
+def old_cell(members: Group, after: Group) -> str:
+    """What became of the old gaits: of their actions in all budgets, and of their success, if it was measured."""
+    if len(members.values("old_equal")) < len(members):
+        return "-"
+    if all(members.values("old_equal")):
+        return "equal to the bit"
+    changed = f"changed by up to {max(members.values('old_largest_rad')):.2g} rad"
+    return f"{count(after.rate())}, {changed}" if after else changed
+
+
+def _draw(shares: Axes, errors: Axes, method: str, levels: Mapping[float, Group]) -> None:
+    color, seconds = COLORS[method], list(levels)
+    survival = [own.rate("survived") for own in levels.values()]
+    plots.band(shares, seconds, survival, color, 0.12)
+    line = {"color": color, "linewidth": 2.0}
+    shares.plot(seconds, [rate.value for rate in survival], marker="o", markersize=3.5, label=method, **line)
+    success = [own.rate().value for own in levels.values()]
+    shares.plot(seconds, success, color=color, linewidth=1.2, linestyle="--")
+    errors.plot(seconds, [1 - own.mean("r2") for own in levels.values()], **line)
+    for value, own in levels.items():
+        missing = 1 - np.array(own.values("r2"))
+        errors.plot([value] * len(missing), missing, "o", color=color, markersize=3.5, alpha=0.6)

@@ -1,0 +1,1 @@
+"""The tables of arXiv 2505.08574, reproduced."""

@@ -1,0 +1,66 @@
+"""Searches for the largest push and the largest command on a grid."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+Passes = Callable[[float], bool]
+"""Whether a level is withstood."""
+
+
+def climb(levels: Sequence[float], passes: Passes) -> float:
+    """The largest level below the first that does not pass, from the smallest upward; 0 if that is the smallest."""
+    largest = 0.0
+    for level in levels:
+        if not passes(level):
+            break
+        largest = level
+    return largest
+
+
+def climb_from(first: float, step: float, steps: int, passes: Passes) -> float:
+    """`climb` from a level that is likely to pass; where it does not, the largest below it that does, or 0.
+
+    Args:
+        first: level that is tried first.
+        step: of the grid.
+        steps: largest number of levels above the first.
+        passes: whether a level passes.
+    """
+    if passes(first):
+        return climb([round(first + k * step, 6) for k in range(1, steps + 1)], passes) or first
+    lower = [round(first - k * step, 6) for k in range(1, round(first / step))]
+    return next((level for level in lower if passes(level)), 0.0)
+
+
+def scouted(
+    levels: Sequence[float],
+    below: Sequence[float],
+    scout: Passes,
+    try_all: Callable[[float], Any],
+    good: Callable[[Any], bool],
+) -> tuple[tuple[float, Any] | None, float]:
+    """Scout upward with few trials until one fails, then come down with all of them, on until what is found is good.
+
+    Args:
+        levels: rising.
+        below: levels that are tried after the lowest of these, falling.
+        scout: whether few trials pass.
+        try_all: what all trials give, None if one fails.
+        good: whether what they give is good as well.
+
+    Returns:
+        The largest level at which no trial failed with what they gave, None if there is none; and the largest at which
+        that was also good, 0 if there is none.
+    """
+    top = 0
+    while top < len(levels) and scout(levels[top]):
+        top += 1
+    passed = None
+    for level in [*reversed(levels[:top] or levels[:1]), *below]:
+        found = try_all(level)
+        if found is None:
+            continue
+        passed = passed or (level, found)
+        if good(found):
+            return passed, level
+    return passed, 0.0

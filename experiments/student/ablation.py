@@ -1,0 +1,210 @@
+"""What every choice in the main job is worth: policies that differ from a reduced job's in one setting each."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+import trainers
+from experiments import plots
+from experiments.agents import Agent
+from experiments.results import Results, distinct
+from experiments.stats import Group, Rate, group
+from experiments.student.commanded import DRAWN
+from experiments.student.episodes import counts, other_gaits
+from experiments.student.transitions import TransitionOptions, transition
+from experiments.study import Cell, Metrics, Study
+from experiments.tables import count, markdown, number, settings
+from experiments.training_runs import TrainedPolicy, TrainingRun, changed
+from trainers.pipeline.config import JobConfig
+from trainers.pipeline.presets import PRESETS
+
+CHANGED, HELD_OUT = "changed world", "held out"
+"""Drawn commands in another world than the model's, and one-step errors on rows of the policy's own demonstrations."""
+CHANGED_WORLD = {"friction": 0.7, "payload_kg": 1.5, "action_delay_s": 0.01, "joint_friction": 0.5}
+"""Arguments of `Go1Env`: the middles of the ranges of the study on robustness, together."""
+DEFAULT = "default, reduced"
+REDUCED = {
+    "clean_s": 30.0,
+    "perturbed_s": 120.0,
+    "held_out_s": 15.0,
+    "rounds": 1,
+    "dagger_s": 60.0,
+    "clone_steps": 3000,
+    "round_steps": 1500,
+    "phase_free_s": 0.0,
+    "round_episodes": 1,
+    "episode_s": 10.0,
+}
+"""Settings that all variants share but for their change."""
+VARIANTS: dict[str, dict[str, Any]] = {
+    DEFAULT: {},
+    "control rate 100 Hz": {"control_hz": 100},
+    "kp 20": {"kp": 20.0},
+    "kp 80": {"kp": 80.0},
+    "three frames": {"history": 3},
+    "without command": {"channels": ("phase", "last_action")},
+    "without phase": {"channels": ("command", "last_action")},
+    "without last action": {"channels": ("command", "phase")},
+    "with gravity": {"channels": ("command", "gravity", "phase", "last_action")},
+    "no perturbed demonstrations": {"clean_s": 150.0, "perturbed_s": 0.0},
+    "no randomization": {"randomized": 0.0},
+    "no gait transitions": {"task_interval": None},
+    "width 64": {"width": 64},
+    "width 128": {"width": 128},
+    "width 512": {"width": 512},
+    "no round": {"rounds": 0},
+    "two rounds": {"rounds": 2},
+    "three rounds": {"rounds": 3},
+    "takeover at 0.1 rad": {"takeover_rad": 0.1},
+}
+"""Name -> what differs from the reduced job."""
+
+
+@dataclass(frozen=True)
+class AblationOptions:
+    """Drawn commands that change, in two worlds, and changes of gait.
+
+    Attributes:
+        training_seed: of every variant.
+        variants: which of `VARIANTS`.
+        episodes, changed_episodes: per gait, in the model's world and in the changed one.
+        seconds: duration of each [s].
+        command_interval: time between commands [s].
+        transitions: the changes of gait.
+        reduced: settings of the main job that all variants share.
+    """
+
+    training_seed: int = 0
+    variants: tuple[str, ...] = tuple(VARIANTS)
+    episodes: int = 20
+    changed_episodes: int = 5
+    seconds: float = 20.0
+    command_interval: float = 5.0
+    transitions: TransitionOptions = TransitionOptions(trials=3)
+    reduced: dict[str, Any] = field(default_factory=lambda: dict(REDUCED))
+
+    def job(self, variant: str) -> JobConfig:
+        """The main job of a variant."""
+        return JobConfig(**self.reduced | VARIANTS[variant], seed=self.training_seed)
+
+
+class Ablation(Study):
+    """One change each: policies of a reduced main job that differ in one setting."""
+
+    name = "student_ablation"
+    title = "One change each"
+    note = (
+        "Students of a reduced main job that differ in one setting: successful episodes with drawn commands per gait, "
+        "mean velocity error, successful gait transitions of all pairs, successful episodes in a changed world "
+        f"({settings(CHANGED_WORLD)}), and one-step R2 on held-out rows of each one's own demonstrations. One "
+        "training seed: differences of a few episodes say nothing."
+    )
+    caption = "Success, velocity error, gait transitions and changed world per variant"
+    full = AblationOptions()
+    quick = AblationOptions(
+        variants=(DEFAULT, "no round"),
+        episodes=1,
+        changed_episodes=1,
+        seconds=3.0,
+        command_interval=2.0,
+        transitions=TransitionOptions(1, 0.5, 2.5),
+        reduced=PRESETS["smoke"] | {"tasks": ("trot", "bound"), "phase_free_s": 0.0, "round_episodes": 1},
+    )
+    code = (*Study.code, "experiments.student.transitions", "experiments.training_runs")
+
+    def agents(self) -> list[Agent]:
+        runs = {name: TrainingRun(self.options.job(name), self.cache / "training") for name in self.options.variants}
+        return [TrainedPolicy(name, path=run.policy, run=run) for name, run in runs.items()]
+
+    def cells(self, agent: Agent) -> list[Cell]:
+        tasks = self.options.job(agent.name).tasks
+        return [
+            Cell(task, condition)
+            for task in tasks
+            for condition in (DRAWN, CHANGED, *(f"to {second}" for second in other_gaits(task, tasks)), HELD_OUT)
+        ]
+
+    def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:
+        """Counts, or one-step errors; the same commands for everybody."""
+        options = self.options
+        if cell.condition == HELD_OUT:
+            return dict(agent.origin.held_out[cell.task])
+        if cell.condition not in (DRAWN, CHANGED):
+            return transition(agent, cell, options.transitions, seed)
+        result = trainers.evaluate(
+            agent.load(),
+            cell.task,
+            options.episodes if cell.condition == DRAWN else options.changed_episodes,
+            options.seconds,
+            seed,
+            command_interval=options.command_interval,
+            **(CHANGED_WORLD if cell.condition == CHANGED else {}),
+        )
+        return counts(result)
+
+    def more(self) -> dict[str, Any]:
+        """What every training changes of the main job."""
+        return {"training": {name: changed(self.options.job(name)) for name in self.options.variants}}
+
+    def table(self, results: Results) -> str:
+        """Per variant: success in every gait, velocity error, gait transitions, the changed world, and one-step R2."""
+        gaits, rows = distinct(results.records, "task"), []
+        for agent, members in group(results.records, "agent").items():
+            per_gait = group([own for own in members if own["condition"] == DRAWN], "task")
+            aggregate = aggregate_variant(members)
+            counted = [count(per_gait[gait].rate()) if gait in per_gait else "-" for gait in gaits]
+            numbers = [
+                number(aggregate["error"], ".3f"),
+                *(count(aggregate[key]) for key in ("transitions", "changed")),
+            ]
+            rows.append([agent, *counted, *numbers, number(aggregate["r2"], ".4f")])
+        header = ["", *gaits, "velocity error [m/s]", "gait transitions", "changed world", "R2"]
+        return markdown(header, rows)
+
+    def figure(self, results: Results) -> Figure:
+        """A dot per variant and metric; the dotted lines are the first variant's, which the others change."""
+        columns = {
+            "success": "success",
+            "error": "velocity error [m/s]",
+            "transitions": "gait transitions",
+            "changed": "changed world",
+            "r2": "one-step R2",
+        }
+        aggregates = {name: aggregate_variant(own) for name, own in group(results.records, "agent").items()}
+        figure = plots.new_figure(2.1 * len(columns) + 1.8, 0.24 * len(aggregates) + 1.0)
+        axes = figure.subplots(1, len(columns), sharey=True)
+        for ax, (key, label) in zip(axes, columns.items()):
+            values = [_plain(own[key]) for own in aggregates.values()]
+            ax.plot(values, range(len(values)), "o", color=plots.BLUE)
+            ax.axvline(values[0], color="0.6", linewidth=0.8, linestyle=":", zorder=0)
+            ax.set_xlabel(label, fontsize=9)
+            ax.tick_params(labelsize=8)
+            ax.grid(axis="y", color="0.93")
+            if key not in ("error", "r2"):
+                ax.set_xlim(-0.04, 1.04)
+        axes[0].set_yticks(range(len(aggregates)), aggregates)
+        axes[0].invert_yaxis()
+        return figure
+
+
+def aggregate_variant(records: Group) -> dict[str, Any]:
+    """Of all gaits together: "success", "transitions" and "changed" as rates; means of "error" [m/s] and "r2"."""
+    of = {
+        name: Group(record for record in records if record["condition"] == name) for name in (DRAWN, CHANGED, HELD_OUT)
+    }
+    return {
+        "success": of[DRAWN].rate(),
+        "transitions": Group(record for record in records if record["condition"].startswith("to ")).rate(),
+        "changed": of[CHANGED].rate(),
+        "error": of[DRAWN].mean("velocity_error"),
+        "r2": of[HELD_OUT].mean("r2"),
+    }
+
+
+def _plain(value: Rate | float | None) -> float:
+    """A rate as a fraction; NaN for nothing."""
+    if isinstance(value, Rate):
+        return value.value
+    return np.nan if value is None else value

@@ -1,0 +1,177 @@
+"""How well policies of several training seeds follow commands that change, inside their ranges and in the corners."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+import trainers
+from experiments import plots
+from experiments.agents import EXPERT, PHASE_FREE, SHARED, STUDENT, Agent, Expert
+from experiments.results import Results, distinct
+from experiments.stats import Group, Rate, group
+from experiments.student.episodes import counts
+from experiments.student.phase import with_correction
+from experiments.study import Cell, Metrics, Study
+from experiments.tables import count, judged, markdown, number
+from experiments.training_runs import TrainedPolicy, TrainingRun, changed
+from trainers.pipeline.config import JobConfig
+
+DRAWN, CORNERS, CORRECTED = "drawn", "corners", "drawn, clock with correction"
+"""Commands from the inside of the range, from its corners, and from its inside for a policy whose clock is its own and
+is corrected at every step by less than the whole estimate."""
+TARGETS = {"success_rate": 0.95, "velocity_error": 0.05, "error_ratio": 2.0}
+"""Smallest success rate, largest velocity error [m/s], and largest ratio of it to the expert's."""
+
+
+@dataclass(frozen=True)
+class CommandedOptions:
+    """Drawn commands, from a standing start.
+
+    Attributes:
+        seeds: of the trainings.
+        episodes, corner_episodes, phase_free_episodes: of each kind, per gait and policy.
+        seconds: duration of each [s].
+        command_interval: time between commands [s].
+        correction: of the clocks that are corrected, see `trainers.PhaseFreePolicy`.
+        job: of the trainings; its seed is not used.
+    """
+
+    seeds: tuple[int, ...] = (0, 1, 2, 3, 4)
+    episodes: int = 100
+    corner_episodes: int = 20
+    phase_free_episodes: int = 20
+    seconds: float = 30.0
+    command_interval: float = 5.0
+    correction: float = 0.5
+    job: JobConfig = JobConfig()
+
+
+class Commanded(Study):
+    """Commands that change, for the main job's policies of several training seeds and the expert."""
+
+    name = "student_commanded"
+    title = "Commands that change, over training seeds"
+    note = (
+        "Successful episodes with a new command every few seconds, of the main job's students for several training "
+        "seeds together, then of the worst seed; mean velocity error, that of the worst seed, the expert's, and the "
+        "largest ratio of a seed's to it; the same with commands from the corners of the ranges; of the students "
+        "without a clock; and of these with a clock of their own that they correct by half at every step. Bold misses "
+        f"a target: success {TARGETS['success_rate']:.0%}, velocity error {TARGETS['velocity_error']:g} m/s, "
+        f"{TARGETS['error_ratio']:g} times the expert's."
+    )
+    caption = "Success per gait and training seed, and velocity errors beside the expert's"
+    full = CommandedOptions()
+    quick = CommandedOptions((0,), 1, 1, 1, 3.0, 2.0, job=JobConfig.from_preset("smoke", tasks=("trot", "bound")))
+    code = (*Study.code, "experiments.student.phase", "experiments.training_runs")
+
+    def agents(self) -> list[Agent]:
+        root, policies, phase_free = self.cache / "training", [], []
+        for seed in self.options.seeds:
+            run = TrainingRun(replace(self.options.job, seed=seed), root)
+            policies.append(TrainedPolicy(STUDENT, seed, path=run.policy, run=run))
+            if run.config.phase_free_s:
+                phase_free.append(TrainedPolicy(PHASE_FREE, seed, path=run.phase_free, run=run))
+        shared = {name: value for name, value in self.options.job.env_kwargs.items() if name in SHARED}
+        return [*policies, *phase_free, Expert(env_kwargs=shared)]
+
+    def cells(self, agent: Agent) -> list[Cell]:
+        conditions = (DRAWN, CORRECTED) if agent.name == PHASE_FREE else (DRAWN, CORNERS)
+        return [Cell(task, condition) for task in self.options.job.tasks for condition in conditions]
+
+    def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:
+        """Counts of one kind of commands; the same ones for everybody."""
+        options, policy = self.options, agent.load()
+        if cell.condition == CORRECTED:
+            policy = with_correction(policy, options.correction)
+        episodes = options.corner_episodes if cell.condition == CORNERS else options.episodes
+        result = trainers.evaluate(
+            policy,
+            cell.task,
+            options.phase_free_episodes if agent.name == PHASE_FREE else episodes,
+            options.seconds,
+            seed,
+            command_interval=options.command_interval,
+            corners=cell.condition == CORNERS,
+            **agent.env_kwargs,
+        )
+        return counts(result)
+
+    def more(self) -> dict[str, Any]:
+        """What the trainings change of the main job."""
+        return {"targets": TARGETS, "training": changed(self.options.job)}
+
+    def table(self, results: Results) -> str:
+        """Per gait, over the training seeds: success, velocity error beside the expert's, corners, without a clock."""
+        rows = []
+        for gait in distinct(results.records, "task"):
+            seeds, expert = _seeds(results, gait), _members(results, gait, EXPERT, DRAWN)
+            tracked = [number(expert.mean("velocity_error"), ".3f"), "-"]
+            success = ["-"] * 5
+            if seeds:
+                together, ratio = seeds.rate(), _worst_ratio(seeds, expert)
+                low, high = together.interval
+                worst = min(own.rate().value for own in group(seeds, "seed").values())
+                errors = (seeds.mean("velocity_error"), seeds.largest("velocity_error"))
+                success = [
+                    count(together, TARGETS["success_rate"]),
+                    f"{low:.1%} ... {high:.1%}",
+                    judged(worst, TARGETS["success_rate"], "higher", ".0%"),
+                    *(judged(error, TARGETS["velocity_error"], "lower", ".3f") for error in errors),
+                ]
+                tracked[1] = judged(ratio, TARGETS["error_ratio"], "lower", ".2f")
+            others = [(STUDENT, CORNERS), (EXPERT, CORNERS), (PHASE_FREE, DRAWN), (PHASE_FREE, CORRECTED)]
+            counted = [count(_members(results, gait, agent, condition).rate()) for agent, condition in others]
+            rows.append([gait, *success, *tracked, *counted])
+        header = ["gait", "success", "95 % interval", "worst seed", "velocity error [m/s]", "worst seed's", "expert's"]
+        return markdown([*header, "worst ratio", "corners", "expert's", "without a clock", "own clock"], rows)
+
+    def figure(self, results: Results) -> Figure:
+        """Per gait: the success of every training seed with that of all together, and velocity errors."""
+        gaits = distinct(results.records, "task")
+        figure = plots.new_figure(9.0, 3.2)
+        left, right = figure.subplots(1, 2)
+        for i, gait in enumerate(gaits):
+            seeds, expert = _seeds(results, gait), _members(results, gait, EXPERT, DRAWN)
+            places = i - 0.15 + np.linspace(-0.1, 0.1, len(seeds))
+            rates = [own["succeeded"] / own["trials"] for own in seeds]
+            left.plot(places, rates, "o", color=plots.BLUE, alpha=0.6, label="each seed")
+            _interval(left, i + 0.15, seeds.rate())
+            errors = [np.nan if own["velocity_error"] is None else own["velocity_error"] for own in seeds]
+            right.plot(places, errors, "o", color=plots.BLUE, alpha=0.6)
+            if expert.values("velocity_error"):
+                color = plots.EXPERT_STYLE["color"]
+                right.plot(i + 0.15, expert.mean("velocity_error"), "D", color=color, label=EXPERT)
+        for ax, key, label in ((left, "success_rate", "success"), (right, "velocity_error", "velocity error [m/s]")):
+            ax.axhline(TARGETS[key], color="0.7", linewidth=0.8, linestyle=":", zorder=0)
+            ax.set_xticks(range(len(gaits)), gaits)
+            ax.set_ylabel(label)
+        plots.shares(left)
+        right.set_ylim(bottom=0.0)
+        plots.legend(figure, (left, right))
+        return figure
+
+
+def _members(results: Results, gait: str, agent: str, condition: str) -> Group:
+    return Group(results.of(task=gait, agent=agent, condition=condition))
+
+
+def _seeds(results: Results, gait: str) -> Group:
+    """A record per training seed."""
+    return _members(results, gait, STUDENT, DRAWN)
+
+
+def _worst_ratio(seeds: Group, expert: Group) -> float | None:
+    """Largest ratio of a seed's velocity error to the expert's; None if there is none."""
+    largest, reference = seeds.largest("velocity_error"), expert.mean("velocity_error")
+    return largest / reference if largest is not None and reference else None
+
+
+def _interval(ax: Axes, x: float, rate: Rate) -> None:
+    """A share with its 95 % interval."""
+    if rate.trials:
+        low, high = rate.interval
+        span = [[max(0.0, rate.value - low)], [max(0.0, high - rate.value)]]
+        ax.errorbar(x, rate.value, span, color="black", marker="s", markersize=4, capsize=3, label="all, 95 %")

@@ -1,0 +1,23 @@
+"""Episodes in closed loop as metrics of a record."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import trainers
+
+
+def counts(*results: trainers.ClosedLoopResult) -> dict[str, Any]:
+    """Trials, how many survived and succeeded, and the mean velocity error [m/s], of all episodes together."""
+    episodes = sum((result.episodes for result in results), ())
+    together = trainers.ClosedLoopResult("", max(result.seconds for result in results), episodes)
+    return {
+        "trials": len(episodes),
+        "survived": sum(not episode.fallen for episode in episodes),
+        "succeeded": sum(episode.success for episode in episodes),
+        "velocity_error": together.velocity_error,
+    }
+
+
+def other_gaits(task: str, tasks: Iterable[str]) -> tuple[str, ...]:
+    """The gaits that can be changed to from a gait."""
+    return tuple(name for name in tasks if name != task)

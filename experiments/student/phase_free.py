@@ -1,0 +1,317 @@
+"""Walking without a clock: policies that see raw proprioception, or a phase that they tell from it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+import trainers
+from experiments import plots
+from experiments.agents import Agent, shipped
+from experiments.results import Record, Results, distinct
+from experiments.stats import Group, group
+from experiments.student.episodes import counts, other_gaits
+from experiments.student.phase import (
+    Estimate,
+    ask_for_phase,
+    asked_phase,
+    phase_error,
+    phase_of,
+    running_phase,
+    with_correction,
+    without_asked,
+)
+from experiments.student.transitions import TransitionOptions
+from experiments.study import ALL_GAITS, Cell, Metrics, Study
+from experiments.tables import count, markdown, number
+from experiments.training_runs import collect, kept_policy, rows_of
+from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.sensing.observation import ObservationLayout, SensorNoise
+from go1_mtl_gym.validation import one_of
+from trainers.pipeline.config import NOISE_RAD, JobConfig
+from trainers.pipeline.demonstrations import shard_jobs
+from trainers.pipeline.new_policy import new_policy
+from trainers.policies.phase_free import phase_free_layout
+
+WALKING, NOISY, TRANSITIONS, PHASE_ERROR = "walking", "noisy sensors", "gait transitions", "phase error"
+FRAMES = 10
+"""That the phase is told from; the main job's default."""
+FELT = ("command", "last_action")
+CLOCKED = ("command", "phase", "last_action")
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A policy without a clock, or the one with.
+
+    Attributes:
+        channels: that it sees, but for the phase of two stages, which is told from the rest.
+        history: frames of proprioception that it sees, or that its phase is told from.
+        asked: whether the network has the phase as two more outputs in training.
+        correction: of two stages, a clocked policy and an estimator; None is one network.
+    """
+
+    channels: tuple[str, ...]
+    history: int = 1
+    asked: bool = False
+    correction: float | None = None
+
+
+VARIANTS = {
+    "paper-literal": Variant(()),
+    "one frame": Variant(FELT),
+    "three frames": Variant(FELT, 3),
+    "ten frames": Variant(FELT, FRAMES),
+    "ten frames, phase asked for": Variant(FELT, FRAMES, asked=True),
+    "two stages": Variant(FELT, FRAMES, correction=1.0),
+    "two stages, clock with correction": Variant(FELT, FRAMES, correction=0.2),
+    "clock": Variant(CLOCKED),
+}
+"""Everything that is trained here, by name; the last is the bound."""
+
+
+@dataclass(frozen=True)
+class PhaseFreeOptions:
+    """What all variants share.
+
+    Attributes:
+        job: rows, network, `clone_steps` of every training and evaluation; it records the channels of `CLOCKED` and as
+            many frames as any variant sees.
+        held_out_s: perturbed demonstrations that the phase's error is measured on, per gait [s].
+        noise_rad: largest action noise in perturbed demonstrations [rad].
+        transitions: changes of gait, for every ordered pair.
+        noisy_s: duration of the episodes with noisy sensors [s].
+        given_episodes: of finished policies that are measured too.
+        corrections: that these are measured with.
+
+    Raises:
+        InvalidInputError: if the job records less than the variants see.
+    """
+
+    job: JobConfig = JobConfig(n_envs=1, history=FRAMES)
+    held_out_s: float = 30.0
+    noise_rad: float = NOISE_RAD
+    transitions: TransitionOptions = TransitionOptions(trials=3)
+    noisy_s: float = 10.0
+    given_episodes: int = 100
+    corrections: tuple[float, ...] = (1.0, 0.2)
+
+    def __post_init__(self) -> None:
+        most = max(variant.history for variant in VARIANTS.values())
+        if not set(CLOCKED) <= set(self.job.channels) or self.job.history < most:
+            raise InvalidInputError(
+                f"expected the channels {CLOCKED} and {most} frames, got {self.job.channels} and {self.job.history}"
+            )
+
+    @property
+    def training(self) -> list[trainers.CollectJob]:
+        """Clean and perturbed demonstrations, as the main job's."""
+        return shard_jobs(self.job, self.job.clean_s, 0) + self._perturbed(self.job.perturbed_s, 1)
+
+    @property
+    def held_out(self) -> list[trainers.CollectJob]:
+        """Perturbed demonstrations of other seeds."""
+        return self._perturbed(self.held_out_s, 2)
+
+    def _perturbed(self, seconds: float, block: int) -> list[trainers.CollectJob]:
+        job = self.job
+        return shard_jobs(job, seconds, block, job.perturbation(self.noise_rad), job.randomization_kwargs)
+
+
+QUICK_JOB = replace(
+    PhaseFreeOptions().job,
+    tasks=("trot", "bound"),
+    clean_s=2.0,
+    perturbed_s=2.0,
+    held_out_s=2.0,
+    shard_s=2.0,
+    width=32,
+    batch_size=256,
+    clone_steps=30,
+    episodes=1,
+    episode_s=2.5,
+)
+
+
+class PhaseFree(Study):
+    """Walking without a clock: raw proprioception, or a phase that is told from it."""
+
+    name = "student_phase_free"
+    title = "Without a clock"
+    note = (
+        "Successful episodes with commands that change, in every gait; survivors, gait transitions and noisy sensors "
+        "of all gaits together; median and 99th percentile of the error of the phase on perturbed walks of the expert "
+        "that nobody learned from. Students with a correction in their name were given; the others learned from the "
+        "same demonstrations."
+    )
+    caption = "Success and error of the phase, of students without a clock"
+    full = PhaseFreeOptions()
+    quick = PhaseFreeOptions(QUICK_JOB, 2.0, NOISE_RAD, TransitionOptions(1, 0.5, 2.5), 2.5, 1, (0.2,))
+    code = (*Study.code, "experiments.student.phase", "experiments.training_runs")
+    takes_policies = True
+
+    def agents(self) -> list[Agent]:
+        """Every variant, and finished policies with every correction.
+
+        Raises:
+            InvalidInputError: if a finished policy is no `trainers.PhaseFreePolicy`, or sees what is not recorded.
+        """
+        given = self.policies or [shipped("phase_free", "phase_free")]
+        for agent in given:
+            policy = agent.load()
+            if not isinstance(policy, trainers.PhaseFreePolicy):
+                raise InvalidInputError(f"expected a PhaseFreePolicy, got a {type(policy).__name__}: {agent.path}")
+            for task in self.options.job.tasks:
+                one_of(task, policy.tasks, f"gait of {agent.name}")
+            job = self.options.job
+            ObservationLayout(policy.tasks, job.channels, job.history).columns(policy.estimator.layout)
+        corrected = [
+            replace(agent, name=f"{agent.name}, correction {correction:g}")
+            for agent in given
+            for correction in self.options.corrections
+        ]
+        return [*(Agent(name) for name in VARIANTS), *corrected]
+
+    def cells(self, agent: Agent) -> list[Cell]:
+        return [Cell(ALL_GAITS)]
+
+    def prepare(self, n_jobs: int) -> None:
+        collect([*self.options.training, *self.options.held_out], self.folder, n_jobs)
+
+    def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:
+        """Train a variant, or take a finished policy, and measure how it walks and how well it knows the phase."""
+        options = self.options
+        if agent.name in VARIANTS:
+            episodes, (policy, estimate) = options.job.episodes, Trainings(options, self.folder).policy(agent.name)
+        else:
+            policy = with_correction(agent.load(), float(agent.name.split()[-1]))
+            episodes, estimate = options.given_episodes, running_phase(policy)
+        records = walk(policy, options, episodes, seed)
+        if estimate is not None:
+            error = phase_error(estimate, rows_of(options.held_out, self.folder))
+            records.append({"condition": PHASE_ERROR, **error})
+        return records
+
+    def table(self, results: Results) -> str:
+        """Per policy: success in every gait, what all gaits have in common, and the error of the phase."""
+        gaits = [task for task in distinct(results.records, "task") if task != ALL_GAITS]
+        rows = []
+        for agent, members in group(results.records, "agent").items():
+            of = group(members, ["task", "condition"])
+            walking = of[ALL_GAITS, WALKING]
+            success = [count(of[gait, WALKING].rate()) for gait in gaits]
+            others = [
+                count(of[ALL_GAITS, key].rate()) if (ALL_GAITS, key) in of else "-" for key in (TRANSITIONS, NOISY)
+            ]
+            error = ", ".join(f"{own[key]:.3f}" for own in _phase_error(members) for key in ("median", "p99")) or "-"
+            tracked = number(walking.mean("velocity_error"), ".3f")
+            rows.append([agent, *success, count(walking.rate("survived")), tracked, *others, error])
+        more = ["survived", "velocity error [m/s]", "gait transitions", "noisy sensors", "phase error [cycles]"]
+        return markdown(["", *gaits, *more], rows)
+
+    def figure(self, results: Results) -> Figure:
+        """Success while walking, with noisy sensors and in gait transitions; the phase error from median to 99 %."""
+        agents, smallest = group(results.of(task=ALL_GAITS), "agent"), 1e-3
+        places = np.arange(len(agents))[::-1]
+        figure = plots.new_figure(9.6, 1.2 + 0.4 * len(agents))
+        shares, errors = figure.subplots(1, 2, sharey=True, width_ratios=(2, 1))
+        styles = {WALKING: (plots.BLUE, "o"), NOISY: (plots.YELLOW, "s"), TRANSITIONS: (plots.GREEN, "^")}
+        for i, (condition, (color, marker)) in enumerate(styles.items()):
+            shown = [
+                (place + 0.2 * (1 - i), Group(own for own in members if own["condition"] == condition).rate())
+                for place, members in zip(places, agents.values())
+            ]
+            known = [(height, rate) for height, rate in shown if rate.trials]
+            for height, rate in known:
+                shares.plot(rate.interval, [height] * 2, color=color, linewidth=1.0, alpha=0.6)
+            heights, rates = [height for height, _ in known], [rate.value for _, rate in known]
+            shares.plot(rates, heights, marker, color=color, markersize=5, linestyle="", label=condition)
+        for place, members in zip(places, agents.values()):
+            for own in _phase_error(members):
+                both = [max(smallest, own[name]) for name in ("median", "p99")]
+                errors.plot(both, [place, place], color="0.35", linewidth=1.5, marker="|", markersize=9)
+        errors.set_xscale("log")
+        errors.set_xlim(smallest, 0.6)
+        errors.set_xlabel("phase error [cycles]")
+        shares.set_xlim(-0.02, 1.02)
+        shares.set_xlabel("success")
+        shares.set_yticks(places, list(agents))
+        plots.legend(figure, [shares])
+        return figure
+
+
+def _phase_error(members: Group) -> list[Record]:
+    """The record of the phase's error, if there is one."""
+    return [own for own in members if own["condition"] == PHASE_ERROR]
+
+
+def walk(policy: Any, options: PhaseFreeOptions, episodes: int, seed: int) -> list[dict[str, Any]]:
+    """Records of a policy in closed loop: unperturbed, with noisy sensors, and through changes of gait."""
+    job, spans = options.job, {"before_s": options.transitions.before_s, "after_s": options.transitions.after_s}
+
+    def evaluate(number_: int, seconds: float, **world: Any) -> dict[str, trainers.ClosedLoopResult]:
+        interval = job.command_interval
+        return {
+            task: trainers.evaluate(policy, task, number_, seconds, seed, command_interval=interval, **world)
+            for task in job.tasks
+        }
+
+    steady = evaluate(episodes, job.episode_s)
+    noisy = evaluate(job.episodes, options.noisy_s, noise=SensorNoise())
+    changed = [
+        trainers.evaluate_transition(policy, first, second, options.transitions.trials, seed, **spans)
+        for first in job.tasks
+        for second in other_gaits(first, job.tasks)
+    ]
+    per_gait = [
+        {"task": task, "condition": WALKING, **counts(result), "step_rate": result.step_rate}
+        for task, result in steady.items()
+    ]
+    together = {WALKING: list(steady.values()), NOISY: list(noisy.values()), TRANSITIONS: changed}
+    return per_gait + [{"condition": name, **counts(*results)} for name, results in together.items() if results]
+
+
+@dataclass(frozen=True)
+class Trainings:
+    """Policies of the same demonstrations, trained when they are asked for and then kept.
+
+    Attributes:
+        options: what all share.
+        folder: of demonstrations and policies.
+    """
+
+    options: PhaseFreeOptions
+    folder: Path
+
+    def policy(self, name: str) -> tuple[Any, Estimate | None]:
+        """A variant, and what gives its estimate of the phase if it has one."""
+        variant = VARIANTS[name]
+        if variant.correction is not None:
+            policy = with_correction(self._kept("two stages", self._two_stages), variant.correction)
+            return policy, running_phase(policy)
+        policy = self._kept(name, lambda: self._one_network(variant))
+        return (without_asked(policy), asked_phase(policy)) if variant.asked else (policy, None)
+
+    def _kept(self, name: str, train: Callable[[], Any]) -> Any:
+        return kept_policy(self.folder / f"{name.replace(',', '').replace(' ', '-')}.zip", train)
+
+    def _one_network(self, variant: Variant) -> trainers.MultiHeadPolicy:
+        rows = rows_of(self.options.training, self.folder)
+        job = replace(self.options.job, channels=variant.channels, history=variant.history)
+        policy = new_policy(job, job.env_kwargs)
+        seen = rows.select(job.channels, job.history)
+        if variant.asked:
+            policy, seen = ask_for_phase(policy, seen, phase_of(rows))
+        trainers.train_bc(policy, seen, job.bc)
+        return policy
+
+    def _two_stages(self) -> trainers.PhaseFreePolicy:
+        job, history = self.options.job, VARIANTS["two stages"].history
+        policy = self._kept("clock", lambda: self._one_network(VARIANTS["clock"]))
+        estimator = trainers.PhaseEstimator(phase_free_layout(policy, history), job.width, job.seed)
+        phase = trainers.PhaseConfig(job.clone_steps, job.batch_size, seed=job.seed)
+        trainers.train_phase(estimator, rows_of(self.options.training, self.folder), phase)
+        return trainers.PhaseFreePolicy(policy, estimator)

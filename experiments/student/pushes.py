@@ -1,0 +1,137 @@
+"""How hard a policy may be pushed: the largest push, per gait and direction, that nearly all trials survive."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from experiments import plots
+from experiments.agents import EXPERT, STUDENT, Agent, shipped, tasks_of, with_expert
+from experiments.pushing import CRUISE, DIRECTIONS, PAIRS, push_w, weaker
+from experiments.results import Results, distinct
+from experiments.searches import climb
+from experiments.stats import group
+from experiments.study import Cell, Metrics, Study
+from experiments.tables import markdown
+from go1_mtl_gym import TASKS
+from trainers.data.environments import derive_seed, make_env
+from trainers.evaluation.rollout import Rollout
+
+STREAM = "kick"
+"""Word that the seeds are drawn with; the published results were."""
+
+
+@dataclass(frozen=True)
+class PushOptions:
+    """The search for the largest push, from the smallest upward.
+
+    Attributes:
+        trials: per size.
+        fraction: of the trials that must survive.
+        step: of the grid of sizes, and the smallest of them [m/s].
+        grid: largest number of sizes.
+        before_s: walking before the push [s]; a random part of the gait's period is added.
+        after_s: without a fall after it [s].
+        directions: which of `DIRECTIONS`.
+    """
+
+    trials: int = 20
+    fraction: float = 0.9
+    step: float = 0.2
+    grid: int = 25
+    before_s: float = 1.5
+    after_s: float = 3.0
+    directions: tuple[str, ...] = tuple(DIRECTIONS)
+
+
+class Pushes(Study):
+    """The largest push that policies and the expert survive, per gait and direction."""
+
+    name = "student_pushes"
+    title = "Pushes"
+    note = (
+        "Largest change of the base's velocity that at least 90 % of the trials survive at a random phase of the "
+        "cycle, walking at 0.3 m/s."
+    )
+    caption = "Largest push survived, of student and expert"
+    full = PushOptions()
+    quick = PushOptions(1, grid=1, before_s=0.5, after_s=0.5)
+    code = (*Study.code, "experiments.pushing", "experiments.searches")
+    takes_policies = True
+
+    def agents(self) -> list[Agent]:
+        return with_expert(self.policies or [shipped(STUDENT, "clocked")])
+
+    def cells(self, agent: Agent) -> list[Cell]:
+        return [Cell(task, direction) for task in tasks_of(agent) for direction in self.options.directions]
+
+    def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:
+        """Search in one direction.
+
+        Returns:
+            "largest" [m/s]; "at_cap": whether the search ended for lack of larger pushes; "tried": [size, survived,
+            trials] of all sizes that were. A fall before the push counts as one after it.
+        """
+        options, policy = self.options, agent.load()
+        kwargs = {**getattr(policy, "env_kwargs", {}), **agent.env_kwargs}
+        period = TASKS[cell.task].gait.period
+        env = make_env(cell.task, None, **kwargs, episode_s=options.before_s + period + options.after_s + 1.0)
+        tried: list[list[Any]] = []
+
+        def passes(size: float) -> bool:
+            trials = range(options.trials)
+            survived = sum(survives(env, policy, cell, size, options, (seed, i)) for i in trials)
+            tried.append([size, survived, options.trials])
+            return survived >= options.fraction * options.trials - 1e-9
+
+        try:
+            largest = climb([round(k * options.step, 6) for k in range(1, options.grid + 1)], passes)
+        finally:
+            env.close()
+        return {"largest": largest, "at_cap": largest == tried[-1][0], "tried": tried}
+
+    def table(self, results: Results) -> str:
+        """Per gait and agent: largest push in every direction [m/s]."""
+        rows = []
+        for (gait, agent), members in group(results.records, ["task", "agent"]).items():
+            own = {record["condition"]: f"{'>= ' * record['at_cap']}{record['largest']:.1f}" for record in members}
+            rows.append([gait, agent, *(own.get(name, "-") for name in DIRECTIONS)])
+        rows.sort(key=lambda row: distinct(results.records, "task").index(row[0]))
+        return markdown(["gait", "", *(f"{name} [m/s]" for name in DIRECTIONS)], rows, text_columns=2)
+
+    def figure(self, results: Results) -> Figure:
+        """Largest push per gait, in the weaker of the two directions, agents side by side."""
+        gaits, agents = distinct(results.records, "task"), distinct(results.records, "agent")
+        figure = plots.new_figure(9.6, 3.2)
+        axes = figure.subplots(1, len(PAIRS), sharey=True)
+        width, styles = 0.8 / len(agents), plots.agent_styles(agents, EXPERT)
+        for ax, (title, pair) in zip(axes, PAIRS.items()):
+            for i, agent in enumerate(agents):
+                per_gait = group(results.of(agent=agent), "task")
+                largest = [
+                    weaker({own["condition"]: own["largest"] for own in per_gait.get(gait, ())}, pair) for gait in gaits
+                ]
+                places = np.arange(len(gaits)) + (i - (len(agents) - 1) / 2) * width
+                color = "0.7" if agent == EXPERT else styles[agent]["color"]
+                bars = ax.bar(places, [size or 0.0 for size in largest], 0.92 * width, color=color, label=agent)
+                ax.bar_label(bars, ["" if size is None else f"{size:.1f}" for size in largest], fontsize=8, padding=1)
+            ax.set_xticks(range(len(gaits)), gaits)
+            ax.set_title(title, fontsize=10)
+        axes[0].set_ylabel("largest push survived [m/s]")
+        axes[0].margins(y=0.12)
+        plots.legend(figure, axes[:1])
+        return figure
+
+
+def survives(env: Any, policy: Any, cell: Cell, size: float, options: PushOptions, trial: tuple[int, int]) -> bool:
+    """Whether one push [m/s] is survived; a trial (seed, number) is the same walk for every size."""
+    keys = (STREAM, cell.task, cell.condition, *trial)
+    base, hz = env.unwrapped, env.unwrapped.control_hz
+    before_s = options.before_s + np.random.default_rng(derive_seed(*keys)).uniform() * TASKS[cell.task].gait.period
+    rollout = Rollout(env, policy, derive_seed(*keys), {"task": cell.task, "command": CRUISE})
+    rollout.walk(round(before_s * hz))
+    if not rollout.fallen:
+        base.push(push_w(cell.condition, size, base.state.rpy[2]))
+        rollout.walk(round(options.after_s * hz))
+    return not rollout.fallen

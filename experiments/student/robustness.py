@@ -1,0 +1,154 @@
+"""How far the world may differ from the model's: one quantity at a time."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+import trainers
+from experiments import plots
+from experiments.agents import EXPERT, STUDENT, Agent, Expert, shipped, tasks_of, with_expert
+from experiments.results import Record, Results, distinct
+from experiments.stats import Group, group
+from experiments.student.episodes import counts
+from experiments.study import Cell, Metrics, Study
+from experiments.tables import count, markdown
+from go1_mtl_gym.sensing.observation import SensorNoise
+from go1_mtl_gym.sensing.state_noise import EstimatorNoise
+
+TARGET = 0.95
+"""Fraction of episodes that a policy is to survive."""
+QUANTITIES: dict[str, tuple[str, tuple[float, ...]]] = {
+    "friction": ("friction", (0.4, 0.55, 0.7, 0.85, 1.0)),
+    "payload_kg": ("payload [kg]", (0.0, 0.75, 1.5, 2.25, 3.0)),
+    "action_delay_s": ("action delay [s]", (0.0, 0.005, 0.01, 0.015, 0.02)),
+    "motor_strength": ("motor strength", (0.9, 0.95, 1.0, 1.05, 1.1)),
+    "joint_friction": ("joint friction [N m]", (0.0, 0.25, 0.5, 0.75, 1.0)),
+    "rotor_inertia": ("rotor inertia [kg m²]", (0.0, 0.0025, 0.005, 0.0075, 0.01)),
+    "contact_time_s": ("contact time [s]", (0.005, 0.01, 0.02, 0.03, 0.04)),
+    "noise": ("noise, in units of the default", (0.0, 0.5, 1.0, 1.5, 2.0)),
+}
+"""Argument of `Go1Env` -> what it is called, and its values from one end of the range to the other. Noise is the
+policy's sensors' or the expert's estimator's."""
+
+
+@dataclass(frozen=True)
+class RobustnessOptions:
+    """Drawn commands in a world that differs.
+
+    Attributes:
+        episodes: per gait and value.
+        seconds: duration of each [s].
+        command_interval: time between commands [s].
+        every: 1 for all values, 2 for the ends and the middle.
+        quantities: which of `QUANTITIES`.
+    """
+
+    episodes: int = 20
+    seconds: float = 10.0
+    command_interval: float = 5.0
+    every: int = 1
+    quantities: tuple[str, ...] = tuple(QUANTITIES)
+
+
+class Robustness(Study):
+    """Friction, payload, delay, motors, contacts and noise, one at a time, of policies and the expert."""
+
+    name = "student_robustness"
+    title = "Another world"
+    note = (
+        "In the middle of each range: survived and successful episodes with drawn commands that change; bold where "
+        f"fewer than {TARGET:.0%}. The picture shows the whole ranges."
+    )
+    caption = "Survival over friction, payload, delay, motors, contacts and noise, of student and expert"
+    full = RobustnessOptions()
+    quick = RobustnessOptions(1, 2.5, 1.5, every=4)
+    takes_policies = True
+
+    def agents(self) -> list[Agent]:
+        return with_expert(self.policies or [shipped(STUDENT, "clocked")])
+
+    def cells(self, agent: Agent) -> list[Cell]:
+        return [Cell(task, quantity) for task in tasks_of(agent) for quantity in self.options.quantities]
+
+    def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:
+        """Counts at every value; the same commands at each."""
+        options, policy = self.options, agent.load()
+        levels = []
+        for value in QUANTITIES[cell.condition][1][:: options.every]:
+            kwargs = {**agent.env_kwargs, **world(cell.condition, value, isinstance(agent, Expert))}
+            interval = options.command_interval
+            result = trainers.evaluate(
+                policy, cell.task, options.episodes, options.seconds, seed, command_interval=interval, **kwargs
+            )
+            levels.append({"value": value, **counts(result)})
+        return levels
+
+    def table(self, results: Results) -> str:
+        """Per policy and quantity, in the middle of its range: survived and successful episodes of every gait."""
+        gaits, rows = distinct(results.records, "task"), []
+        for (agent, quantity), members in group(results.records, ["agent", "condition"]).items():
+            if agent != EXPERT:
+                middle = _middle(members)
+                per_gait = group([own for own in members if own["value"] == middle], "task")
+                cells = [
+                    ", ".join(count(per_gait[gait].rate(key), TARGET) for key in ("survived", "succeeded"))
+                    if gait in per_gait
+                    else "-"
+                    for gait in gaits
+                ]
+                rows.append([agent, QUANTITIES[quantity][0], f"{middle:g}", *cells])
+        return markdown(["", "quantity", "middle", *gaits], rows, text_columns=2)
+
+    def figure(self, results: Results) -> Figure:
+        """Survival over each quantity: of all gaits together, with 95 % intervals, and, thin, of the weakest gait."""
+        shown = [name for name in QUANTITIES if name in distinct(results.records, "condition")]
+        columns = min(4, len(shown))
+        rows = -(-len(shown) // columns)
+        figure = plots.new_figure(2.9 * columns + 0.4, 2.15 * rows + 0.5)
+        axes = figure.subplots(rows, columns, sharey=True, squeeze=False)
+        for ax, quantity in zip(axes.flat, shown):
+            _survival(ax, results.of(condition=quantity))
+            ax.set_xlabel(QUANTITIES[quantity][0], fontsize=9)
+            ax.tick_params(labelsize=8)
+        for ax in axes.flat[len(shown) :]:
+            ax.set_axis_off()
+        for ax in axes[:, 0]:
+            ax.set_ylabel("survival", fontsize=9)
+        plots.legend(figure, axes.flat[:1])
+        return figure
+
+
+def world(quantity: str, value: float, for_expert: bool) -> dict[str, Any]:
+    """Arguments of `Go1Env` that make a quantity have a value for a policy or the expert."""
+    if quantity != "noise":
+        return {quantity: value}
+    return {"estimator_noise": EstimatorNoise().scaled(value)} if for_expert else {"noise": SensorNoise().scaled(value)}
+
+
+def _middle(records: Sequence[Record]) -> float:
+    values = distinct(records, "value")
+    return values[len(values) // 2]
+
+
+def _survival(ax: Axes, records: Sequence[Record]) -> None:
+    styles = plots.agent_styles(distinct(records, "agent"), EXPERT)
+    for agent, members in group(records, "agent").items():
+        style, levels = styles[agent], group(members, "value")
+        together = [level.rate("survived") for level in levels.values()]
+        weakest = [
+            min(own.rate("survived").value for own in group(level, "task").values()) for level in levels.values()
+        ]
+        plots.band(ax, [*levels], together, style["color"], 0.15)
+        ax.plot([*levels], [r.value for r in together], **style, linewidth=2.0, marker="o", markersize=3.5, label=agent)
+        ax.plot([*levels], weakest, **style, linewidth=0.9, label=f"{agent}, weakest gait")
+    ax.set_xticks([*levels], [f"{value:g}" for value in levels])
+    ax.axhline(TARGET, color="0.7", linewidth=0.8, linestyle=":", zorder=0)
+    plots.shares(ax)
+
+
+def _weakest(level: Group) -> float:
+    """Survival of the weakest gait."""
+    return min(own.rate("survived").value for own in group(level, "task").values())

@@ -1,0 +1,99 @@
+"""Changes of gait while walking."""
+
+from dataclasses import dataclass
+
+from matplotlib.figure import Figure
+
+import trainers
+from experiments import plots
+from experiments.agents import STUDENT, Agent, shipped, tasks_of, with_expert
+from experiments.results import Results, distinct
+from experiments.stats import Rate, group
+from experiments.student.episodes import counts, other_gaits
+from experiments.study import Cell, Metrics, Study
+from experiments.tables import count, markdown
+
+
+@dataclass(frozen=True)
+class TransitionOptions:
+    """Changes of gait.
+
+    Attributes:
+        trials: per ordered pair of gaits.
+        before_s, after_s: walking in the first gait and in the second [s].
+    """
+
+    trials: int = 20
+    before_s: float = 2.0
+    after_s: float = 6.0
+
+
+class Transitions(Study):
+    """Changes of gait between every ordered pair, of policies and the expert."""
+
+    name = "student_transitions"
+    title = "Gait transitions"
+    note = (
+        "Successful changes while walking at a drawn command: no fall, and the second gait's commands and steps are "
+        "followed as success asks. Last column: without a fall, to all gaits together."
+    )
+    caption = "Successful gait transitions, of student and expert"
+    full = TransitionOptions()
+    quick = TransitionOptions(1, 0.5, 3.0)
+    takes_policies = True
+
+    def agents(self) -> list[Agent]:
+        return with_expert(self.policies or [shipped(STUDENT, "clocked")])
+
+    def cells(self, agent: Agent) -> list[Cell]:
+        tasks = tasks_of(agent)
+        return [Cell(first, f"to {second}") for first in tasks for second in other_gaits(first, tasks)]
+
+    def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:
+        """Counts of one pair."""
+        return transition(agent, cell, self.options, seed)
+
+    def table(self, results: Results) -> str:
+        """Per agent and first gait: successes to each second gait, and survivals of all together."""
+        rates, rows = transition_rates(results), []
+        gaits = gaits_of(rates)
+        for agent in distinct(results.records, "agent"):
+            for (first,), members in group(results.of(agent=agent), ["task"]).items():
+                cells = [count(rates[agent].get((first, second), Rate(0, 0))) for second in gaits]
+                rows.append([agent, first, *cells, count(members.rate("survived"))])
+        return markdown(["", "from", *(f"to {gait}" for gait in gaits), "survived"], rows, text_columns=2)
+
+    def figure(self, results: Results) -> Figure:
+        """One matrix per agent, from the row's gait to the column's."""
+        rates = transition_rates(results)
+        gaits = gaits_of(rates)
+        figure = plots.new_figure((1.3 + 0.75 * len(gaits)) * len(rates) + 0.5, 1.4 + 0.62 * len(gaits))
+        axes = figure.subplots(1, len(rates), squeeze=False)[0]
+        for ax, (agent, pairs) in zip(axes, rates.items()):
+            image = plots.transition_matrix(ax, gaits, pairs)
+            ax.set_title(f"{agent}: successful gait transitions", fontsize=10)
+        figure.colorbar(image, ax=axes, shrink=0.85, label="fraction")
+        return figure
+
+
+def transition(agent: Agent, cell: Cell, options: TransitionOptions, seed: int) -> Metrics:
+    """Counts of one change of gait, from the cell's task to the one in its condition."""
+    second = cell.condition.removeprefix("to ")
+    times = {"before_s": options.before_s, "after_s": options.after_s}
+    policy, kwargs = agent.load(), agent.env_kwargs
+    return counts(trainers.evaluate_transition(policy, cell.task, second, options.trials, seed, **times, **kwargs))
+
+
+def transition_rates(results: Results, key: str = "succeeded") -> dict[str, dict[tuple[str, str], Rate]]:
+    """{agent: {(from, to): successes}}."""
+    found: dict[str, dict[tuple[str, str], Rate]] = {}
+    for (agent, first, condition), members in group(results.records, ["agent", "task", "condition"]).items():
+        if condition.startswith("to "):
+            found.setdefault(agent, {})[first, condition.removeprefix("to ")] = members.rate(key)
+    return found
+
+
+def gaits_of(rates: dict[str, dict[tuple[str, str], Rate]]) -> list[str]:
+    """Every gait that is changed from or to."""
+    pairs = [pair for own in rates.values() for pair in own]
+    return list(dict.fromkeys([first for first, _ in pairs] + [second for _, second in pairs]))

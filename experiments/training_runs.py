@@ -1,0 +1,132 @@
+"""Policies that a study trains: the main job's, and those of demonstrations that its cells share."""
+
+import contextlib
+import dataclasses
+import json
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import trainers
+from experiments.agents import PolicyFile
+from experiments.study import digest
+from trainers.algorithms.optimizer import torch_threads
+from trainers.pipeline.config import JobConfig
+from trainers.pipeline.job import Job
+from trainers.utils.files import write_json
+
+UNUSED = ("preset", "n_envs", "device", "threads", "episodes", "video_s")
+"""Settings of the main job that its policies do not depend on, run as here."""
+HELD_OUT = "held_out.json"
+"""File of the one-step errors on held-out rows, and of the time; the last that a run writes."""
+
+
+@dataclass(frozen=True)
+class TrainingRun:
+    """The main job without baselines, evaluation and pictures, on one thread of one process.
+
+    Its folder's name stands for its settings: made again, it is read; interrupted, it goes on. Bars and messages go to
+    ``progress.log``. A main job with equal settings on one thread gives an equal policy.
+
+    Attributes:
+        config: of the main job; `UNUSED` settings are ignored.
+        root: of all runs' folders.
+    """
+
+    config: JobConfig
+    root: Path
+
+    @property
+    def folder(self) -> Path:
+        """Named by the seed, and by all settings but the `UNUSED`."""
+        used = {name: value for name, value in dataclasses.asdict(self.config).items() if name not in UNUSED}
+        return self.root / f"seed-{self.config.seed}-{digest([repr(sorted(used.items()))])}"
+
+    @property
+    def policy(self) -> Path:
+        """File of the policy."""
+        return self.folder / "policy.zip"
+
+    @property
+    def phase_free(self) -> Path:
+        """File of the same without a clock, if the settings ask for one."""
+        return self.folder / "phase_free.zip"
+
+    @property
+    def held_out(self) -> dict[str, dict[str, float]]:
+        """Gait -> one-step errors on held-out rows of a finished run, as `trainers.offline_metrics` gives them."""
+        return self._finished()["tasks"]
+
+    def make(self) -> float:
+        """Train what is not trained yet; returns how long it took [s].
+
+        Raises:
+            InvalidInputError: if a setting cannot be.
+        """
+        if not (self.folder / HELD_OUT).is_file():
+            self.folder.mkdir(parents=True, exist_ok=True)
+            with open(self.folder / "progress.log", "a", encoding="utf-8") as log, contextlib.ExitStack() as stack:
+                stack.enter_context(torch_threads(1))
+                stack.enter_context(contextlib.redirect_stderr(log))
+                stack.enter_context(contextlib.redirect_stdout(log))
+                self._train()
+        return self._finished()["seconds"]
+
+    def _train(self) -> None:
+        defaults = {each.name: each.default for each in dataclasses.fields(JobConfig) if each.name in UNUSED}
+        job = Job(dataclasses.replace(self.config, **defaults | {"n_envs": 1}), self.folder)
+        train, held_out = job.demonstrations()
+        policy = job.dagger(job.clone(train, held_out), train, held_out)
+        job.phase_free(policy)
+        errors = trainers.offline_metrics(policy, held_out)
+        write_json(self.folder / HELD_OUT, {"tasks": errors, "seconds": round(sum(job.folder.seconds.values()), 1)})
+
+    def _finished(self) -> dict[str, Any]:
+        return json.loads((self.folder / HELD_OUT).read_text(encoding="utf-8"))
+
+
+@dataclass(frozen=True)
+class TrainedPolicy(PolicyFile):
+    """A policy of a training run, which is made before anything is measured.
+
+    Attributes:
+        run: that makes it; two agents may be of one.
+    """
+
+    run: TrainingRun = field(kw_only=True)
+
+    @property
+    def origin(self) -> TrainingRun:
+        """The run."""
+        return self.run
+
+    def prepare(self) -> float:
+        return self.run.make()
+
+
+def changed(config: JobConfig) -> dict[str, Any]:
+    """The settings that are not the main job's defaults and that its policies depend on."""
+    default, own = JobConfig().as_dict(), config.as_dict()
+    return {name: value for name, value in own.items() if name not in UNUSED and value != default[name]}
+
+
+# -- What cells share --------------------------------------------------------------------------------------------------
+
+
+def collect(jobs: Iterable[trainers.CollectJob], folder: Path, n_jobs: int) -> None:
+    """Have everything demonstrated that the cells of a folder learn from."""
+    trainers.collect_all(list(jobs), folder / "demonstrations", n_jobs, progress=True)
+
+
+def rows_of(jobs: Sequence[trainers.CollectJob], folder: Path) -> trainers.Demonstrations:
+    """The rows of some demonstrations; those that are not in the folder yet are made."""
+    paths = trainers.collect_all(jobs, folder / "demonstrations")
+    return trainers.Demonstrations.concatenate([trainers.Demonstrations.load(path) for path in paths])
+
+
+def kept_policy(path: Path, train: Callable[[], Any]) -> Any:
+    """A policy: read if it is there, else trained and written."""
+    if not path.is_file():
+        train().save(path)
+    return trainers.load(path)

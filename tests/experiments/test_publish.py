@@ -1,0 +1,164 @@
+"""The command line, and the pages that are written from results."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from experiments import publish
+from experiments.__main__ import main, without_folders
+from experiments.catalog import STUDIES, study_class
+from experiments.main_job import results_of, summary_table
+from experiments.publish import copy_run, publish_command, summarized, without_out
+from experiments.results import Results
+from go1_mtl_gym import InvalidInputError
+from tests.experiments.published import FOLDER
+
+README = "# A title\n\n<!-- results:summary -->\nold\n<!-- /results:summary -->\n\nThe end.\n"
+
+
+def metrics(**change) -> dict:
+    """What a run of the main job leaves."""
+    loop = {"survival_rate": 1.0, "success_rate": 0.9, "velocity_error": 0.03, "step_rate": 2.5, "episodes": 20}
+    loop |= {"success_interval": [0.7, 0.97], "survival_s": 30.0}
+    step = {"mse": 1e-5, "mae": 1e-3, "r2": 0.99}
+    tasks = {"trot": {"multi_head": step | loop, "expert": loop | {"success_rate": 1.0}}}
+    head = {"seed": 4, "versions": {"numpy": "2"}, "seconds": {"clone": 60.0}, "config": {"preset": "default"}}
+    return {"tasks": tasks, "command": "python examples/dagger.py --out runs/a --seed 4", **head} | change
+
+
+@pytest.fixture
+def run(tmp_path) -> Path:
+    folder = tmp_path / "run"
+    folder.mkdir()
+    (folder / "metrics.json").write_text(json.dumps(metrics()))
+    for name in (*publish.COPIED, *publish.POLICIES):
+        (folder / name).write_bytes(name.encode())
+    return folder
+
+
+@pytest.fixture
+def root(tmp_path) -> Path:
+    folder = tmp_path / "root"
+    folder.mkdir()
+    (folder / "README.md").write_text(README)
+    return folder
+
+
+def test_what_is_committed_is_up_to_date():
+    publish_command(["--check"])
+
+
+def test_a_run_becomes_records_a_page_and_the_summary(run, root):
+    publish_command([str(run)], root)
+    results = Results.read(root / "docs" / "results" / "main_job.json")
+    assert results.command == "python examples/dagger.py --seed 4" and results.seed == 4
+    (student,) = results.of(agent="multi_head")
+    assert (student["trials"], student["survived"], student["succeeded"]) == (20, 20, 18)
+    assert not {"success_rate", "success_interval", "episodes"} & set(student)
+    page = (root / "docs" / "results" / "main_job.md").read_text()
+    assert "| trot | multi-head student | 0.000010 | 0.0010 | 0.9900 | 18/20 | 20/20 |" in page
+    readme = (root / "README.md").read_text()
+    assert readme.startswith("# A title\n") and readme.endswith("The end.\n") and "old" not in readme
+    assert "| trot | 20/20 | 18/20 | 0.030 | 0.030 | 2.50 | 2.50 | 2.50 |" in readme
+    assert (root / "trainers" / "assets" / "clocked.zip").read_bytes() == b"policy.zip"
+    before = {path: path.stat().st_mtime_ns for path in root.rglob("*") if path.is_file()}
+    publish_command([], root)
+    publish_command(["--check"], root)
+    assert before == {path: path.stat().st_mtime_ns for path in root.rglob("*") if path.is_file()}
+    (root / "docs" / "results" / "main_job.md").write_text("typed by hand")
+    with pytest.raises(InvalidInputError, match="out of date: docs/results/main_job.md"):
+        publish_command(["--check"], root)
+
+
+@pytest.mark.parametrize("name", ["metrics.json", "gaits.gif", "policy.zip"])
+def test_a_missing_file_is_named_before_anything_is_copied(run, root, name):
+    (run / name).unlink()
+    with pytest.raises(InvalidInputError, match=name):
+        copy_run(run, root)
+    assert not (root / "docs").exists()
+
+
+def test_other_runs_are_refused(run, root):
+    (run / "metrics.json").write_text(json.dumps(metrics(config={"preset": "smoke"})))
+    with pytest.raises(InvalidInputError, match="'smoke'"):
+        copy_run(run, root)
+    with pytest.raises(InvalidInputError, match="metrics of a finished run"):
+        results_of({"tasks": {}}, "")
+
+
+@pytest.mark.parametrize("text", ["", README.replace("/results", "results"), README + README])
+def test_missing_markers_are_named(text):
+    with pytest.raises(InvalidInputError, match="<!-- results:summary -->"):
+        summarized(text, "table")
+
+
+def test_the_summary_has_the_four_gaits_of_expert_and_student():
+    lines = summary_table(Results.read(FOLDER / "main_job.json")).splitlines()
+    assert [line.split("|")[1].strip() for line in lines[2:]] == ["trot", "bound", "jump", "walk"]
+    assert all(len(line.split("|")) == 10 for line in lines)
+
+
+def test_no_path_of_the_machine_is_published(tmp_path):
+    words = ["run", "student_pushes", "--out", str(tmp_path), f"--cache={tmp_path}", "--seed", "2"]
+    assert without_folders(words) == "python -m experiments run student_pushes --seed 2"
+    peer = without_folders(["run", "benchmark_expert", "--go2-convex-mpc", str(tmp_path)])
+    assert peer == "python -m experiments run benchmark_expert --go2-convex-mpc PATH"
+    assert without_out("python examples/dagger.py --out=a --seed 3 --out b") == "python examples/dagger.py --seed 3"
+
+
+def test_every_study_has_its_results_and_its_pictures():
+    for name in STUDIES:
+        cls, path = study_class(name), FOLDER / f"{name}.json"
+        assert cls.name == name and Results.read(path).study == name
+        for end, caption in ({"": cls.caption} | cls.more_captions).items():
+            assert not caption or (FOLDER / f"{name}{end}.png").is_file()
+        study = cls(cls.full)
+        assert study.table(Results.read(path)).count("\n") >= 2
+        assert (study.figure(Results.read(path)) is None) == (not cls.caption)
+
+
+# -- The command line --------------------------------------------------------------------------------------------------
+
+
+def test_every_study_is_listed(capsys):
+    assert main(["list"]) == 0
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == list(STUDIES)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        ("no_such_study", "no_such_study"),
+        ("student_budget --seed -1", "-1"),
+        ("student_budget --n-jobs 0", "n_jobs"),
+        ("student_budget --budgets-s 10 30", "twice"),
+        ("student_pushes --policy missing.zip", "missing.zip"),
+        ("student_pushes --only hop --quick", "hop"),
+        ("paper_simulation --precision half", "half"),
+        ("new_gaits --gaits trot", "trot"),
+    ],
+)
+def test_impossible_commands_are_refused_in_a_sentence(arguments, reason, tmp_path, capsys):
+    folders = ["--out", str(tmp_path / "out"), "--cache", str(tmp_path / "cache")]
+    assert main(["run", *arguments.split(), *folders]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("error: ") and error.count("\n") == 1 and reason in error
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.slow
+def test_a_quick_run_writes_results_and_picture_and_goes_on(tmp_path, capsys):
+    arguments = ["run", "student_transitions", "--quick", "--n-jobs", "1", "--only", "to walk"]
+    folders = ["--out", str(tmp_path), "--cache", str(tmp_path / "cache")]
+    assert main([*arguments, *folders]) == 0
+    first = (tmp_path / "student_transitions.json").read_text()
+    assert (
+        "| expert | trot |" in capsys.readouterr().out and (tmp_path / "student_transitions.png").stat().st_size > 5000
+    )
+    results = Results.read(tmp_path / "student_transitions.json")
+    assert len(results.records) == 6 and results.command.endswith("--quick --n-jobs 1 --only 'to walk'")
+    cells = {path: path.stat().st_mtime_ns for path in (tmp_path / "cache").rglob("*.json")}
+    assert len(cells) == 6 and main([*arguments, *folders]) == 0
+    assert (tmp_path / "student_transitions.json").read_text() == first
+    assert cells == {path: path.stat().st_mtime_ns for path in cells}
