@@ -1,5 +1,5 @@
 # make dagger       installs into .venv, then runs the main job      make dagger ARGS="--preset smoke"
-# make test         installs into .venv, then lints and tests        make test PYTEST_ARGS="tests/env -x"
+# make test         installs into .venv; lint, types and tests       make test PYTEST_ARGS="tests/env -x"
 # make test-newest  the same tests on the newest gymnasium and stable-baselines3, in .venv-newest
 # make docs         builds the documentation into docs/_build         open docs/_build/index.html
 # make clean        removes both environments and everything built
@@ -28,6 +28,7 @@ dagger: .venv/.installed
 
 test: .venv/.installed-test
 	.venv/bin/ruff check .
+	.venv/bin/mypy
 	.venv/bin/python -m pytest $(PYTEST_ARGS)
 
 test-newest: .venv-newest/.installed-test
@@ -59,5 +60,5 @@ docs: .venv/.installed-docs
 	touch $@
 
 clean:
-	rm -rf .venv .venv-newest docs/_build build dist *.egg-info .pytest_cache .ruff_cache
+	rm -rf .venv .venv-newest docs/_build build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache
 	find go1_mtl_gym experts trainers examples experiments tests -name __pycache__ -prune -exec rm -rf {} +

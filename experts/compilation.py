@@ -13,7 +13,7 @@ from collections.abc import Callable
 from functools import update_wrapper
 from typing import Any, TypeVar, cast
 
-from numba import njit
+from numba import njit, typeof
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
@@ -52,11 +52,10 @@ class _Guarded:
         try:
             return self._dispatcher(*args)
         except Exception as error:
-            # What a damaged file raises depends on where it is damaged: EOFError, UnpicklingError, ValueError, ... An
-            # error of the function itself comes again from the uncached one, and is raised there.
+            # What a damaged file raises depends on where it is damaged: EOFError, UnpicklingError, ValueError, ...
             folder = self._dispatcher.stats.cache_path
-            if folder is None:
-                raise
+            if folder is None or tuple(map(typeof, args)) in self._dispatcher.signatures:
+                raise  # it was there, and ran: the error is the function's
             self._dispatcher = njit(self._function)
             answer = self._dispatcher(*args)
             message = (

@@ -47,6 +47,7 @@ from experts.whole_body.jacobian_transpose import jacobian_transpose_torques
 from experts.whole_body.qp import WholeBodyQP
 from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PDGains
+from go1_mtl_gym.deprecation import renamed_arguments
 from go1_mtl_gym.sensing.state import RobotState
 from go1_mtl_gym.validation import number_in, one_of
 
@@ -61,6 +62,7 @@ WHOLE_BODY: dict[str, Callable[[], WholeBody]] = {
 """Ways from forces to torques by name; the first, the default, tracks best for its time (docs/results)."""
 
 
+@renamed_arguments(linearisation="linearization")
 @dataclass(frozen=True)
 class NMPCConfig:
     """Everything that can be tuned about the expert.
@@ -244,7 +246,7 @@ class NMPCExpert:
             if not solution.usable:
                 return horizon.reference, horizon.nominal
             before, states, inputs = states, np.vstack([horizon.x0, solution.states]), solution.inputs
-            # The model is nonlinear in attitude and lever arms alone, so these two say whether it still holds.
+            # Attitude and lever arms are what the Jacobians depend on most: have they moved, these no longer hold.
             moved = np.abs(states - before)
             if max(moved[:, RPY].max(), moved[:, COM].max() / config.com_height) < config.sqp_tolerance:
                 break

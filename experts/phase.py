@@ -1,11 +1,12 @@
-"""The old name of `experts.phase_fitting`; goes with the next release."""
-
-import warnings
+"""The old name of `experts.phase_fitting`, for one more release."""
 
 from experts import phase_fitting
+from go1_mtl_gym.deprecation import warn_renamed
 
 
 def __getattr__(name: str) -> object:
-    value = getattr(phase_fitting, name)
-    warnings.warn("experts.phase is now experts.phase_fitting", DeprecationWarning, stacklevel=2)
+    """Look everything up in the new module."""
+    value: object = getattr(phase_fitting, name)
+    if not name.startswith("__"):  # the import system asks for these
+        warn_renamed(f"experts.phase.{name}", f"experts.phase_fitting.{name}")
     return value

@@ -136,6 +136,7 @@ def fit_phase(
     cost = np.square(residuals).sum(axis=1)
     best = int(np.argmin(cost))
     before, here, after = cost[best - 1], cost[best], cost[(best + 1) % SAMPLES]
+    # The lowest point of the parabola through three costs; where they lie on a line, the grid's best.
     bend = before + after - 2 * here
     shift = 0.5 * (before - after) / bend if bend > 0 else 0.0
     least = here - 0.25 * (before - after) * shift
@@ -150,6 +151,7 @@ def _residuals(
     vx, vy, yaw_rate = state.command.tolist()
     back = turn(-state.rpy[2])  # from the world to the heading frame
     arm = to_complex_array(state.gait.nominal_feet_b)
+    # The sway is that of the phase in question, so there is one mean velocity per phase of the grid.
     com_velocity = to_complex(dynamics.com_velocity_w) * back
     mean = com_velocity - cycle.sway
     velocity = mean[:, None] + carried(arm, yaw_rate)
@@ -192,6 +194,7 @@ def _cycle(gait: Gait, swing: SwingRule, com_height: float) -> _Cycle:
     above = arc > 0.0
     landed = 1.0 - min(np.sqrt(swing.press / gait.swing_height) / 4, 1.0)  # s at which the arc meets the ground
     motion = nominal_motion(gait, _standing_inertia(), com_height - robot.FOOT_RADIUS)
+    # The body's deviation when each foot came down: its stance began `leg` cycles ago.
     touchdown = motion.at((phase[:, None] - leg).ravel())[:, 3:5].reshape(SAMPLES, 4, 2)
     return _Cycle(
         ground=_contact_fraction(leg, duty, 1 - duty - landed * under_way),
@@ -212,6 +215,7 @@ def _contact_fraction(leg: np.ndarray, duty: float, waiting: float) -> np.ndarra
     """1 on the ground, 0 in the air, with ramps; the foot is down for `waiting` cycles before its stance begins."""
     since = np.mod(leg + waiting, 1.0)
     length = duty + waiting
+    # Distance from the middle of the contact, the short way round the cycle.
     centered = np.abs(since - length / 2)
     centered = np.minimum(centered, 1.0 - centered)
     return np.clip(0.5 + (length / 2 - centered) / (2 * _BLUR), 0.0, 1.0)

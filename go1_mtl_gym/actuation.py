@@ -44,8 +44,10 @@ class PDGains:
 class ActionMap:
     """Affine map between actions in [-1, 1] and joint targets in radians: target = center + half_range * action.
 
-    The range is the joint range widened by (tau_max + kd v_max)/kp, so it holds the target of every torque within the
-    limits at every joint position and speed within theirs.
+    Action 0 asks for the standing robot's `robot.HOME_POSE`. The map reaches every target that a torque within the
+    limits can need, at every joint position and speed within theirs: the joint range [lower, upper], widened by
+    (tau_max + kd v_max)/kp on both sides. As it is symmetric about the home pose, it reaches beyond one of the two:
+    half_range = max(upper + margin - home, home - lower + margin), joint by joint.
 
     Attributes:
         center: shape (12,) [rad], read-only.
@@ -65,15 +67,13 @@ class ActionMap:
     @classmethod
     def for_gains(cls, gains: PDGains) -> "ActionMap":
         """The map that belongs to one pair of gains."""
-        margin = (robot.TORQUE_LIMIT + gains.kd * robot.SPEED_LIMIT) / gains.kp
-        low, high = robot.JOINT_LOWER - margin, robot.JOINT_UPPER + margin
-        return cls(center=(low + high) / 2, half_range=(high - low) / 2)
+        low, high = _needed_targets(gains)
+        return cls(center=robot.HOME_POSE, half_range=np.maximum(high - robot.HOME_POSE, robot.HOME_POSE - low))
 
     @classmethod
     def of_version_0_1(cls, gains: PDGains) -> "ActionMap":
-        """The map of version 0.1, centered on the middle of the widened joint range."""
-        margin = (robot.TORQUE_LIMIT + gains.kd * robot.SPEED_LIMIT) / gains.kp
-        low, high = robot.JOINT_LOWER - margin, robot.JOINT_UPPER + margin
+        """The map of version 0.1, which is centered on the middle of the targets that are needed: a deep crouch."""
+        low, high = _needed_targets(gains)
         return cls(center=(low + high) / 2, half_range=(high - low) / 2)
 
     def to_radians(self, action: np.ndarray) -> np.ndarray:
@@ -83,3 +83,12 @@ class ActionMap:
     def from_radians(self, target: np.ndarray) -> np.ndarray:
         """Actions of joint targets [rad], shape (..., 12), clipped to [-1, 1]."""
         return np.clip((target - self.center) / self.half_range, -1.0, 1.0)
+
+
+def _needed_targets(gains: PDGains) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest joint target [rad] that a torque within the limits can need, shape (12,) each.
+
+    From a = q + (tau + kd v)/kp with q, tau and v at the ends of their ranges.
+    """
+    margin = (robot.TORQUE_LIMIT + gains.kd * robot.SPEED_LIMIT) / gains.kp
+    return robot.JOINT_LOWER - margin, robot.JOINT_UPPER + margin

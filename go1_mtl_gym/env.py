@@ -1,7 +1,6 @@
 """The Gymnasium environment of the Go1."""
 
 import copy
-from collections import deque
 from numbers import Integral
 from typing import Any
 
@@ -12,12 +11,11 @@ from gymnasium.error import ResetNeeded
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike
 
-from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PHYSICS_HZ, ActionMap
 from go1_mtl_gym.contract import PolicyContract
 from go1_mtl_gym.deprecation import renamed_attribute
 from go1_mtl_gym.env_config import RENDER_MODES, EnvConfig
-from go1_mtl_gym.episode import Episode, draw_conditions, how_it_ended
+from go1_mtl_gym.episode import Episode, begin_episode, how_it_ended
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.expert import Expert, make_expert
 from go1_mtl_gym.gaits import check_phase
@@ -29,14 +27,66 @@ from go1_mtl_gym.sim.simulation import Simulation
 from go1_mtl_gym.tasks import TASKS, Task, check_reset_options
 from go1_mtl_gym.validation import finite_vector, one_of
 
-RESET_JOINT_NOISE = 0.03
-"""Largest deviation of a joint from the home pose after a reset [rad]."""
-
 
 class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
     """A Unitree Go1 that moves in the gait of a task, as told by a command.
 
-    DOCSTRING
+    Without arguments it is what the policy in the package drives, and what reinforcement learning can learn. With
+    ``channels=()`` it shows the 34 + K numbers of arXiv 2505.08574, which hold neither command nor phase.
+
+    ## Action space
+
+    ``Box(-1, 1, (12,), float32)``: joint targets, center + half_range * action (`action_map`); 0 is the standing pose.
+    The actuators apply tau = kp (target - q) - kd v at 1 kHz, clipped at 23.7, 23.7 and 35.55 N m.
+
+    | num         | joint of FL, FR, RL, RR | center [rad] | half range at kp 50, kd 2 [rad] |
+    |-------------|-------------------------|--------------|---------------------------------|
+    | 0, 3, 6, 9  | hip                     | 0.0          | 2.541                           |
+    | 1, 4, 7, 10 | thigh                   | 0.9          | 5.279                           |
+    | 2, 5, 8, 11 | calf                    | -1.8         | 2.531                           |
+
+    ## Observation space
+
+    A flat float32 ``Box``, by default of 55 numbers; `layout` names the slices, whatever the arguments.
+
+    | num     | part          | unit            | bounds +-    | there                                          |
+    |---------|---------------|-----------------|--------------|------------------------------------------------|
+    | 0 - 2   | accelerometer | m/s^2           | 160          | always; specific force, trunk frame            |
+    | 3 - 5   | gyroscope     | rad/s           | 35           | always; trunk frame                            |
+    | 6 - 17  | q             | rad             | 2 pi         | always                                         |
+    | 18 - 29 | dq            | rad/s           | 90.3, 60.2   | always                                         |
+    | 30 - 33 | contacts      | 0 or 1          | 0 ... 1      | always; FL FR RL RR                            |
+    | 34 - 36 | command       | m/s, m/s, rad/s | 5            | channel, by default; filtered                  |
+    |         | gravity       | -               | 1            | channel; unit vector, trunk frame              |
+    | 37 - 38 | phase         | -               | 1            | channel, by default; sine and cosine           |
+    | 39 - 50 | last_action   | -               | 1            | channel, by default                            |
+    |         | history       | as above        | as above     | if `history` > 1: 34 numbers per older frame   |
+    | 51 - 54 | task          | 0 or 1          | 0 ... 1      | always; one-hot, K = len(tasks)                |
+
+    ## Rewards
+
+    Tracking of velocity and yaw rate, posture, effort, alive (`go1_mtl_gym.rewards.reward_terms`), weighted by the
+    task; itemised in ``info["reward_terms"]``.
+
+    ## Episodes
+
+    Start standing at phase 0 of the gait clock, joints within 0.03 rad of the home pose. Terminate on a fall (trunk
+    below 0.14 m, or tilted by more than 60 degrees) or when the physics diverges. Truncate after `episode_s`.
+
+    ``info``: task, command, filtered_command, base_velocity (vx, vy, yaw rate in the heading frame), contacts, phase,
+    standing, reward_terms, fallen, ended ("", "fall", "unstable" or "time").
+
+    ## Arguments
+
+    An `EnvConfig`, or its attributes as keyword arguments; and the fields of `PhysicsParams`, such as ``friction=0.5``.
+
+    ## Version history
+
+    * v0: first. Since package 0.2, action 0 stands and the defaults are the policy's; 0.1 had ``channels=()``, all
+      registered tasks, and a crouch at action 0.
+
+    Raises:
+        InvalidInputError: if an argument is not as described.
     """
 
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": 50}
@@ -95,21 +145,7 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
         """
         name, command = check_reset_options(options, self.tasks, self.config.task)
         super().reset(seed=int(seed) if isinstance(seed, Integral) else seed)
-        task = TASKS[name or str(self.np_random.choice(self.tasks))]
-        drawn = task.draw_command(self.np_random)
-        joint_noise = self.np_random.uniform(-RESET_JOINT_NOISE, RESET_JOINT_NOISE, 12)
-        conditions = draw_conditions(self.config, self.np_random)
-        if conditions.physics is not None:
-            self._simulation.set_physics_params(conditions.physics)
-        self._simulation.reset(robot.HOME_POSE + joint_noise)
-        self._episode = Episode(
-            task,
-            drawn if command is None else command,
-            last_action=self.action_map.from_radians(robot.HOME_POSE),
-            frames=deque(maxlen=self.layout.history),
-            sensor_noise=conditions.sensor_noise,
-            state_source=conditions.state_source,
-        )
+        self._episode = begin_episode(self.config, self._simulation, self.np_random, name, command)
         state = self.state
         observation = self._observe(self._episode, state)
         if self._expert is not None:

@@ -12,9 +12,13 @@ from go1_mtl_gym.sensing.state_estimator import StateEstimatorConfig
 from go1_mtl_gym.sensing.state_noise import EstimatorNoise
 from go1_mtl_gym.sim.domain_randomization import DomainRandomization
 from go1_mtl_gym.sim.physics_params import PhysicsParams
-from go1_mtl_gym.tasks import TASKS, check_task_names
+from go1_mtl_gym.tasks import PAPER_TASKS, check_task_names
 from go1_mtl_gym.validation import integer_in, number_in, one_of, parameters_of, switch
 
+DEFAULT_TASKS = PAPER_TASKS
+"""What an environment knows unless told otherwise, besides its own task: the tasks of the policy in the package."""
+DEFAULT_CHANNELS = ("command", "phase", "last_action")
+"""What an environment shows unless told otherwise: the channels that the policy in the package sees."""
 RENDER_MODES = ("human", "rgb_array")
 PIXELS = (16, 4096)
 """Smallest and largest width and height of a picture [pixels]."""
@@ -37,7 +41,8 @@ class EnvConfig:
 
     Attributes:
         task: name of the task, or None to draw one per episode.
-        tasks: names of the tasks in the one-hot id, in order; None means all that are registered now.
+        tasks: names of the tasks in the one-hot id, in order; None means `DEFAULT_TASKS` and, if it is none of them,
+            `task` at the end.
         channels: optional parts of the observation, from `go1_mtl_gym.sensing.observation.CHANNELS`, in that order.
         history: number of proprioceptive frames in the observation, 1 ... 50.
         control_hz: rate of `step` [Hz]; a divisor of 1000 from 50 to 1000.
@@ -59,7 +64,7 @@ class EnvConfig:
 
     task: str | None = "trot"
     tasks: tuple[str, ...] = None  # type: ignore[assignment]  # None never stays
-    channels: tuple[str, ...] = ()
+    channels: tuple[str, ...] = DEFAULT_CHANNELS
     history: int = 1
     control_hz: int = 50
     kp: float = 50.0
@@ -77,7 +82,7 @@ class EnvConfig:
 
     def __post_init__(self) -> None:
         """Check everything, and bring it into its one form."""
-        tasks = check_task_names(tuple(TASKS) if self.tasks is None else self.tasks)
+        tasks = check_task_names(default_tasks(self.task) if self.tasks is None else self.tasks)
         layout = ObservationLayout(tasks, self.channels, self.history)
         control_hz = check_control_hz(self.control_hz)
         gains = PDGains(self.kp, self.kd)
@@ -191,6 +196,15 @@ class EnvConfig:
         for name in values:
             one_of(name, _names(cls), "field of an environment's configuration")
         return cls(**values)
+
+
+def default_tasks(task: object) -> tuple[str, ...]:
+    """Names of the tasks that an environment knows unless told otherwise.
+
+    Args:
+        task: its own, or None.
+    """
+    return DEFAULT_TASKS if task is None or task in DEFAULT_TASKS else (*DEFAULT_TASKS, str(task))
 
 
 def check_control_hz(control_hz: object) -> int:

@@ -1,7 +1,9 @@
 """README.md and docs/: their code runs, their commands, files and names exist, their numbers are the code's."""
 
 import re
+import sys
 from dataclasses import fields
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -62,6 +64,28 @@ def test_named_files_exist():
     named = set(re.findall(pattern, "\n".join(PAGES.values())))
     assert len(named) > 5
     assert not [name for name in sorted(named) if not (ROOT / name).is_file()]
+
+
+@pytest.mark.parametrize(
+    "use_old_name",
+    [
+        lambda: trainers.PerturbationConfig(kick=0.1, kick_interval=2.0, corner_share=0.2),
+        lambda: go1_mtl_gym.PerturbationWrapper(go1_mtl_gym.Go1Env(), kick=0.1),
+        lambda: go1_mtl_gym.DomainRandomization(share=0.3),
+        lambda: import_module("go1_mtl_gym.realism").Realism,
+        lambda: go1_mtl_gym.Go1Env().realism,
+        lambda: experts.NMPCConfig(linearisation="shifted"),
+        lambda: import_module("experts.phase").fit_phase,
+        lambda: trainers.ClocklessPolicy,
+        lambda: trainers.learn_without_clock,
+        lambda: trainers.evaluate_switch,
+        lambda: trainers.load_pretrained("clockless"),
+    ],
+)
+def test_names_of_the_version_before_work_as_the_page_on_migrating_says(use_old_name):
+    sys.modules.pop("experts.phase", None)  # it warns when it is imported
+    with pytest.warns(DeprecationWarning):
+        assert use_old_name() is not None
 
 
 def test_make_targets_exist():

@@ -1,28 +1,158 @@
-"""The examples as a visitor runs them: from the command line, in a folder of their own."""
+"""The examples as a visitor runs them; the short ones in this process, the main job in processes of its own."""
 
+import importlib.util
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
 from go1_mtl_gym import PAPER_TASKS
 
 ROOT = Path(__file__).parent.parent
-IMPOSSIBLE = [("--control-hz", "300"), ("--device", "tpu"), ("--rounds", "-1"), ("--history", "0"), ("--seed", "-1")]
+SMOKE_TASKS = ("bound", "walk")
+"""Half of the gaits, in half of the time."""
 CLOSED_LOOP = {"survival_rate", "survival_s", "velocity_error", "step_rate", "success_rate"}
 ONE_STEP = {"mse", "mae", "r2", "r2_joint_mean"}
+IMPOSSIBLE = {
+    "--control-hz": "300",
+    "--device": "tpu",
+    "--rounds": "-1",
+    "--history": "0",
+    "--seed": "-1",
+    "--n-envs": "0",
+}
 
 
-def start(*arguments: str, script: str = "dagger.py") -> subprocess.Popen:
-    command = [sys.executable, str(ROOT / "examples" / script), *arguments]
+def example(name: str) -> ModuleType:
+    """The module of an example, loaded anew."""
+    spec = importlib.util.spec_from_file_location(f"example_{name}", ROOT / "examples" / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+# -- Short ones --------------------------------------------------------------------------------------------------------
+
+
+def test_quickstart_drives_the_policy_of_the_package(capsys):
+    assert example("quickstart").run(["--task", "walk", "--seconds", "3", "--command", "0.3", "0", "0"]) == 0
+    name, speed, asked = re.fullmatch(
+        r"(\w+): still up, (\S+) m/s forward, \S+ m/s left, \S+ rad/s; asked for (\S+), 0, 0\n", capsys.readouterr().out
+    ).groups()
+    assert name == "walk" and float(asked) == 0.3 and float(speed) == pytest.approx(0.3, abs=0.15)
+
+
+def test_quickstart_drives_a_policy_from_a_file(tmp_path, capsys):
+    import trainers
+
+    trainers.load_pretrained("phase_free").save(tmp_path / "policy.zip")
+    assert example("quickstart").run([str(tmp_path / "policy.zip"), "--seconds", "1"]) == 0
+    assert capsys.readouterr().out.startswith("trot: still up")
+
+
+def test_the_expert_example_changes_gait(capsys):
+    assert example("expert").run(["--task", "bound", "--then", "trot", "--seconds", "1"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.partition(",")[0] for line in lines] == ["bound: fallen False", "trot: fallen False"]
+
+
+def test_a_custom_gait_walks(passing_tasks, capsys):
+    assert example("custom_gait").run(["--seconds", "2"]) == 0
+    assert "amble: fallen False" in capsys.readouterr().out
+
+
+def test_a_custom_expert_nods_without_falling(capsys):
+    assert example("custom_expert").run(["--seconds", "2"]) == 0
+    pattern = r"100 rows in 1 episode, front left knee from (\S+) to (\S+) rad\n"
+    low, high = map(float, re.fullmatch(pattern, capsys.readouterr().out).groups())
+    assert high - low == pytest.approx(2 * 0.24, abs=0.03)
+
+
+def test_a_new_gait_leaves_a_policy_that_quickstart_drives(tmp_path, capsys):
+    out = tmp_path / "policies" / "with_pace.zip"
+    options = ["--seconds", "4", "--steps", "20", "--episodes", "1", "--out", str(out)]
+    assert example("new_gait").run(options) == 0
+    printed = capsys.readouterr().out
+    assert "trot: success in 100 %" in printed and "pace: success in" in printed
+    assert example("quickstart").run([str(out), "--task", "pace", "--seconds", "0.2"]) == 0
+
+
+def test_a_policy_without_a_clock_is_made_and_saved(tmp_path, capsys):
+    out = tmp_path / "phase_free.zip"
+    assert example("phase_free").run(["--seconds", "1", "--steps", "10", "--episodes", "1", "--out", str(out)]) == 0
+    assert "without one it sees     command, last_action and 10 frames" in capsys.readouterr().out
+    assert example("quickstart").run([str(out), "--seconds", "0.2"]) == 0
+
+
+def test_ppo_goes_on_from_the_policy(tmp_path, capsys):
+    out = tmp_path / "ppo.zip"
+    assert example("ppo").run(["--steps", "1", "--critic-steps", "40", "--episodes", "1", "--out", str(out)]) == 0
+    assert capsys.readouterr().out.count("success in 100 % of 1 episodes before") == len(PAPER_TASKS)
+    assert example("quickstart").run([str(out), "--seconds", "0.2"]) == 0
+
+
+# -- Errors ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "name", ["quickstart", "dagger", "expert", "custom_gait", "custom_expert", "new_gait", "phase_free", "ppo"]
+)
+def test_help_says_what_the_options_are(name, capsys):
+    with pytest.raises(SystemExit) as end:
+        example(name).run(["--help"])
+    assert end.value.code == 0 and "options:" in capsys.readouterr().out
+
+
+def refused(name: str, arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+    """The one line on stderr that an example ends with, after "error: "."""
+    assert example(name).run(arguments) == 2
+    printed = capsys.readouterr()
+    assert printed.out == "" and printed.err.startswith("error: ") and printed.err.count("\n") == 1
+    return printed.err
+
+
+@pytest.mark.parametrize("option", IMPOSSIBLE)
+def test_impossible_settings_are_refused_before_anything_is_written(option, tmp_path, capsys):
+    out = tmp_path / "run"
+    message = refused("dagger", ["--preset", "smoke", "--out", str(out), option, IMPOSSIBLE[option]], capsys)
+    assert option[2:].replace("-", "_") in message and IMPOSSIBLE[option] in message and len(message) < 200
+    assert not out.exists()
+
+
+def test_a_folder_that_cannot_be_written_to_is_refused(tmp_path, capsys):
+    (tmp_path / "file").write_text("mine")
+    folders = [tmp_path / "file", tmp_path / "file" / "below", *([Path("/proc/run")] if Path("/proc").is_dir() else [])]
+    for out in folders:
+        assert str(out) in refused("dagger", ["--preset", "smoke", "--out", str(out)], capsys)
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+def test_a_policy_that_is_none_is_refused(tmp_path, capsys):
+    (tmp_path / "policy.zip").write_text("no policy")
+    assert "policy.zip" in refused("quickstart", [str(tmp_path / "policy.zip")], capsys)
+    assert "nowhere.zip" in refused("quickstart", ["nowhere.zip"], capsys)
+
+
+def test_a_command_beyond_the_limit_is_refused(capsys):
+    assert "command" in refused("quickstart", ["--command", "9", "0", "0"], capsys)
+
+
+# -- The main job ------------------------------------------------------------------------------------------------------
+
+
+def start(*arguments: str) -> subprocess.Popen:
+    command = [sys.executable, str(ROOT / "examples" / "dagger.py"), *arguments]
     return subprocess.Popen(
         command,
         cwd=ROOT,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
         start_new_session=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # tests in a background job ignore Ctrl-C
         stdout=subprocess.PIPE,
@@ -37,28 +167,28 @@ def finish(process: subprocess.Popen) -> str:
     return output
 
 
-@pytest.mark.parametrize("option", IMPOSSIBLE, ids=lambda option: option[0])
-def test_impossible_settings_are_refused_before_anything_is_written(option, tmp_path):
-    process = start("--preset", "smoke", "--out", str(tmp_path / "run"), *option)
-    output, _ = process.communicate(timeout=120)
-    assert process.returncode == 2 and "error: " in output and option[1] in output
-    assert not (tmp_path / "run").exists()
-
-
-@pytest.fixture(scope="module")
-def smoke(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """A smoke run that was interrupted by Ctrl-C after cloning and then taken up again."""
-    out = tmp_path_factory.mktemp("job") / "run"
-    arguments = ("--preset", "smoke", "--n-envs", "2", "--out", str(out))
-    process = start(*arguments)
+def interrupt(process: subprocess.Popen, once: Path) -> str:
+    """Press Ctrl-C a second after a file is there; the output."""
     deadline = time.monotonic() + 300
-    while not (out / "parts" / "cloned.zip").is_file():
+    while not once.exists():
         assert process.poll() is None and time.monotonic() < deadline, process.communicate()[0][-4000:]
         time.sleep(0.1)
     time.sleep(1.0)
     os.killpg(process.pid, signal.SIGINT)
     output, _ = process.communicate(timeout=60)
     assert process.returncode == 130, output[-4000:]
+    assert "Traceback" not in output, output[-4000:]
+    return output
+
+
+@pytest.fixture(scope="module")
+def smoke(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """A smoke run that was interrupted by Ctrl-C, once while collecting and once in a round, and taken up again."""
+    out = tmp_path_factory.mktemp("job") / "run"
+    arguments = ("--preset", "smoke", "--tasks", *SMOKE_TASKS, "--n-envs", "2", "--out", str(out))
+    output = interrupt(start(*arguments), out / "demonstrations")
+    assert f"interrupted; what is done is kept, go on with: --out {out}" in output
+    output = interrupt(start(*arguments), out / "parts" / "cloned.zip")
     assert f"--out {out}" in output
     shards = {path: path.stat().st_mtime_ns for path in (out / "demonstrations").iterdir()}
     output = finish(start(*arguments))
@@ -70,7 +200,7 @@ def smoke(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
 def test_smoke_writes_the_metrics_that_others_read(smoke):
     out, _ = smoke
     metrics = json.loads((out / "metrics.json").read_text())
-    assert list(metrics["tasks"]) == list(PAPER_TASKS)
+    assert list(metrics["tasks"]) == list(SMOKE_TASKS)
     for learners in metrics["tasks"].values():
         assert set(learners["expert"]) >= CLOSED_LOOP
         for name in ("multi_head", "pooled", "paper_literal"):
@@ -85,8 +215,13 @@ def test_smoke_writes_the_metrics_that_others_read(smoke):
 @pytest.mark.slow
 def test_smoke_prints_one_table_per_gait_and_leaves_its_files(smoke):
     out, output = smoke
-    assert all(task in output for task in PAPER_TASKS) and "R2" in output
-    assert output.count("the same without a clock") == len(PAPER_TASKS)
+    assert all(task in output for task in SMOKE_TASKS) and "R2" in output
+    assert output.count("| the same without a clock") == len(SMOKE_TASKS)
+    for name in ("policy.zip", "phase_free.zip", "metrics.json"):
+        assert f"  {out / name}" in output
+    assert f"tensorboard --logdir {out / 'tensorboard'}" in output
+    assert f"python examples/quickstart.py {out / 'policy.zip'}" in output
+    assert "So little training gives a robot that falls" in output
     for name in ("policy.zip", "phase_free.zip", "joint_targets.png", "table.md", "config.json"):
         assert (out / name).stat().st_size > 0
     assert list((out / "tensorboard").glob("events.*"))
@@ -96,7 +231,7 @@ def test_smoke_prints_one_table_per_gait_and_leaves_its_files(smoke):
 @pytest.mark.gl
 def test_smoke_films_every_gait(smoke):
     out, _ = smoke
-    assert all((out / f"{name}.gif").stat().st_size > 10_000 for name in (*PAPER_TASKS, "gaits"))
+    assert all((out / f"{name}.gif").stat().st_size > 10_000 for name in (*SMOKE_TASKS, "gaits"))
 
 
 @pytest.mark.slow
@@ -112,7 +247,7 @@ def test_the_saved_policies_drive_their_environments(smoke, name):
 
 
 @pytest.mark.slow
-def test_the_phase_free_student_is_the_student_with_an_estimate_of_the_phase(smoke):
+def test_the_phase_free_policy_is_the_policy_with_an_estimate_of_the_phase(smoke):
     import trainers
 
     student, phase_free = (trainers.load(smoke[0] / name) for name in ("policy.zip", "phase_free.zip"))
@@ -126,30 +261,7 @@ def test_the_phase_free_student_is_the_student_with_an_estimate_of_the_phase(smo
 def test_a_finished_run_is_not_repeated_and_other_settings_are_refused(smoke):
     out, _ = smoke
     before = (out / "policy.zip").stat().st_mtime_ns, (out / "metrics.json").read_text()
-    process = start("--preset", "smoke", "--n-envs", "2", "--out", str(out), "--seed", "1")
+    process = start("--preset", "smoke", "--tasks", *SMOKE_TASKS, "--out", str(out), "--seed", "1")
     output, _ = process.communicate(timeout=120)
     assert process.returncode == 2 and "other settings (seed)" in output
     assert before == ((out / "policy.zip").stat().st_mtime_ns, (out / "metrics.json").read_text())
-
-
-@pytest.mark.slow
-def test_the_report_goes_on_after_an_interruption(tmp_path):
-    out, parts = tmp_path / "expert.json", tmp_path / "parts"
-    arguments = ["--quick", "--tasks", "trot", "walk", "--sections", "survival", "transitions"]
-    arguments += ["--n-jobs", "2", "--parts", str(parts), "--out", str(out)]
-    process = start(*arguments, script="report_expert.py")
-    deadline = time.monotonic() + 120
-    while not list(parts.glob("survival-*.json")):
-        assert process.poll() is None and time.monotonic() < deadline, process.communicate()[0][-4000:]
-        time.sleep(0.05)
-    os.killpg(process.pid, signal.SIGINT)
-    output, _ = process.communicate(timeout=60)
-    assert process.returncode == 130 and "goes on from there" in output, output[-4000:]
-    assert not out.exists()
-    finished = {path: path.stat().st_mtime_ns for path in parts.glob("[!.]*.json")}
-    output = finish(start(*arguments, script="report_expert.py"))
-    assert finished and all(path.stat().st_mtime_ns == written for path, written in finished.items())
-    scores = json.loads(out.read_text(encoding="utf-8"))
-    assert list(scores["tasks"]) == ["trot", "walk"] and "| trot | 1/1 |" in output
-    assert scores["report"]["transitions"]["trot"]["walk"]["trials"] == 1
-    assert (tmp_path / "expert_transitions.png").is_file()

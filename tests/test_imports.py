@@ -92,9 +92,9 @@ def test_one_version_everywhere():
 
 
 def packaged() -> set[str]:
-    """The modules, models and policies of the packages, relative to the root."""
+    """The modules, their marks of being typed, models and policies of the packages, relative to the root."""
     files = (path for package in FORBIDDEN for path in (ROOT / package).rglob("*"))
-    return {path.relative_to(ROOT).as_posix() for path in files if path.suffix in {".py", ".xml", ".zip"}}
+    return {path.relative_to(ROOT).as_posix() for path in files if path.suffix in {".py", ".typed", ".xml", ".zip"}}
 
 
 def built(target: str, folder: Path) -> Path:

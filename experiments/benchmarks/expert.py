@@ -161,7 +161,7 @@ def contestants(options: ExpertOptions) -> dict[str, Call]:
     """Who takes part; solvers that are not installed are named on standard error.
 
     Raises:
-        MissingPeer: if the checkout that was asked for cannot be used.
+        MissingPeerError: if the checkout that was asked for cannot be used.
     """
     calls: dict[str, Call] = {OURS: Ours(MPCConfig())}
     for name in EXACT:

@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from experts.mpc.frame import Frame
 from experts.mpc.srbd import FORCE_UNIT
-from experts.mpc.warm_start import Frame
 from experts.planning.body_reference import body_reference
 from experts.planning.footholds import FootholdRule
 from experts.planning.nominal_motion import NominalMotion
@@ -63,10 +63,12 @@ def pose_horizon(
     dt = gait.period / steps
     roll, pitch, yaw = whole_body_attitude(state, dynamics)
     frame = Frame(dynamics.com_w, yaw)
+    # In that frame the robot stands at the origin and faces along x, by construction.
     com = np.array([0.0, 0.0, dynamics.com_w[2]])
     reference = body_reference(state, 0.0, com, motion, com_height, dt, steps)
     middle = state.phase + (np.arange(steps) + 0.5) / steps
     feet_w = footholds.over_horizon(state, dynamics.com_w, velocity_w, dynamics.feet_w, middle)
+    # The rigid body is the whole robot, so it turns at the mean rate of trunk and legs, not at the trunk's.
     turning, moving = frame.vectors(np.stack([dynamics.mean_omega_w, dynamics.com_velocity_w]))
     return Horizon(
         frame=frame,

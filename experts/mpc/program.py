@@ -85,6 +85,7 @@ class QuadraticProgram:
         self.A.data[self._to_a] = -model.A[1:].ravel().take(self._from_a)
         self.A.data[self._to_b] = -model.B.ravel().take(self._from_b)
         self.q[:end], self.q[end:] = x_ref.ravel(), u_ref.ravel()
+        # The expanded squares: q = -Q x_ref and -R u_ref; what depends on neither x nor u is left out.
         self.q *= -self.weight
         # x0 is known, so A[0] x0 goes to the right-hand side instead of into the matrix.
         offset = model.c.ravel().copy()
@@ -92,6 +93,7 @@ class QuadraticProgram:
         self.l[:end] = self.u[:end] = offset
         on_ground = contact.ravel()
         normal = slice(end + NORMAL_ROW, None, ROWS_PER_FOOT)
+        # A foot that lands or lifts off within an interval may push less than f_min, or not at all.
         self.l[normal] = (on_ground > 1 - 1e-9) * (self.config.min_force / FORCE_UNIT)
         self.u[normal] = on_ground * (self.config.max_force / FORCE_UNIT)
 

@@ -4,45 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from experts.mpc.srbd import COM, FORCE_UNIT, OMEGA, RPY, VELOCITY
+from experts.mpc.frame import WORLD, Frame
+from experts.mpc.srbd import FORCE_UNIT
 from go1_mtl_gym.gaits import Gait
 from go1_mtl_gym.sensing.state import RobotState
-
-
-class Frame:
-    """A frame on the ground below a point, turned about the vertical.
-
-    Args:
-        point_w: world [m], shape (3,); its height does not matter.
-        yaw: [rad].
-    """
-
-    def __init__(self, point_w: np.ndarray, yaw: float) -> None:
-        self.yaw = float(yaw)
-        self.origin_w = np.array([point_w[0], point_w[1], 0.0])
-        cos, sin = np.cos(yaw), np.sin(yaw)
-        self.rotation = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-
-    def points(self, points_w: np.ndarray) -> np.ndarray:
-        """Points in this frame, shape (..., 3)."""
-        return (points_w - self.origin_w) @ self.rotation
-
-    def vectors(self, vectors_w: np.ndarray) -> np.ndarray:
-        """Vectors in this frame, shape (..., 3)."""
-        return vectors_w @ self.rotation
-
-    def states(self, states: np.ndarray, other: "Frame") -> np.ndarray:
-        """The MPC's states (n, 12) of another frame in this one."""
-        turn = other.rotation.T @ self.rotation
-        out = np.empty_like(states)
-        out[:, RPY] = states[:, RPY]
-        out[:, 2] += np.remainder(other.yaw - self.yaw + np.pi, 2 * np.pi) - np.pi
-        out[:, COM] = self.points(states[:, COM] @ other.rotation.T + other.origin_w)
-        out[:, OMEGA], out[:, VELOCITY] = states[:, OMEGA] @ turn, states[:, VELOCITY] @ turn
-        return out
-
-
-WORLD = Frame(np.zeros(3), 0.0)
 
 
 @dataclass(frozen=True)
@@ -77,6 +42,7 @@ class Trajectory:
             nominal: its inputs, shape (N, 12).
         """
         steps = len(self.inputs)
+        # Places on the old grid, in intervals: states lie at its ends, and inputs act in the middles.
         where = (time_s - self.time_s) / self.dt + np.arange(steps + 1)
         low = np.clip(where.astype(int), 0, steps - 1)
         fraction = (where - low)[:, None]
@@ -90,7 +56,7 @@ class Trajectory:
 
     def forces_w(self, time_s: float) -> np.ndarray:
         """Ground forces planned for a time within the horizon, world [N], shape (4, 3)."""
-        k = int((time_s - self.time_s) / self.dt + 1e-9)
+        k = int((time_s - self.time_s) / self.dt + 1e-9)  # rounding must not throw the beginning back by one
         forces = self.inputs[min(max(k, 0), len(self.inputs) - 1)].reshape(4, 3) * FORCE_UNIT
         return forces @ self.frame.rotation.T
 
@@ -120,6 +86,7 @@ class Recall:
 
     def store(self, trajectory: Trajectory) -> None:
         """Remember one; it replaces another of the same time."""
+        # Asked twice at one time, the expert must start from the same earlier trajectory both times.
         if self._last is not None and self._last.time_s < trajectory.time_s:
             self._before = self._last
         self._last = trajectory

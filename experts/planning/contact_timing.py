@@ -15,6 +15,7 @@ def swing_middle(state: RobotState, hold_s: float) -> np.ndarray:
     gait = state.gait
     leg = gait.leg_phase(state.phase)
     lift_off, touchdown = (gait.duty - leg) * gait.period, (1.0 - leg) * gait.period
+    # A leg in the air lifted off before the hold began, which counts as at its beginning.
     return (np.clip(lift_off, 0.0, hold_s) + np.minimum(touchdown, hold_s)) / 2
 
 
@@ -22,6 +23,7 @@ def contact_pieces(state: RobotState, hold_s: float) -> list[tuple[float, float]
     """The parts of a hold between which feet touch down or lift off: middle [s] and fraction of the hold of each."""
     gait = state.gait
     leg = gait.leg_phase(state.phase)
+    # Times to the next lift-off and touchdown of each leg.
     edges = np.concatenate([(gait.duty - leg) % 1.0, 1.0 - leg]) * gait.period
     cuts = [0.0]
     for edge in sorted(edges[edges < hold_s - SHORTEST_PIECE_S].tolist()):

@@ -64,6 +64,7 @@ class NominalMotion:
 
 def _distribute_load(stance: np.ndarray, feet_b: np.ndarray, total: float) -> np.ndarray:
     """Non-negative loads of the feet on the ground that add up to `total`, nearly level and nearly even."""
+    # Least squares in three parts: the sum, which is as good as exact, then level, then even.
     arm = feet_b[stance, :2] / 0.1
     count = int(stance.sum())
     rows = np.vstack([1e3 * np.ones(count), _MOMENT_WEIGHT * arm.T, np.eye(count)])
@@ -101,8 +102,10 @@ def nominal_motion(gait: Gait, inertia: tuple[float, float, float], height: floa
     supported = stance.any(axis=1)
     load = np.zeros((SAMPLES, 4))
     for i in np.flatnonzero(supported):
+        # What is missing while all feet are in the air has to be made up for while some stand.
         load[i] = _distribute_load(stance[i], gait.nominal_feet_b, SAMPLES / supported.sum())
     total = load.sum(axis=1, keepdims=True)
+    # sum x_i f_z,i and sum y_i f_z,i, and the center of pressure.
     lever = load @ gait.nominal_feet_b[:, :2]
     horizontal = np.clip(-lever / height, -SWAY * total, SWAY * total)
     center = lever / np.maximum(total, 1e-9)
@@ -121,6 +124,7 @@ def nominal_motion(gait: Gait, inertia: tuple[float, float, float], height: floa
             robot.GRAVITY * (total - 1.0),
         ]
     )
+    # Without a zero mean the motion would not be periodic.
     dt = gait.period / SAMPLES
     velocity = _integrate(acceleration - acceleration.mean(axis=0), dt)
     fraction = load / np.maximum(total, 1e-9)

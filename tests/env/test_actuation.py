@@ -56,11 +56,21 @@ def test_mujoco_applies_the_law_and_clips_it_at_the_torque_limits(gains):
 
 def test_action_range_by_hand():
     action_map = ActionMap.for_gains(PDGains(50.0, 2.0))
-    hip = (23.7 + 2 * 30.1) / 50  # 1.678 rad beyond the joint range
-    calf = (35.55 + 2 * 20.06) / 50
-    np.testing.assert_allclose(action_map.to_radians(np.ones(12))[[0, 2]], [0.863 + hip, -0.888 + calf])
-    np.testing.assert_allclose(action_map.to_radians(-np.ones(12))[[0, 2]], [-0.863 - hip, -2.818 - calf])
-    np.testing.assert_allclose(action_map.center[:3], [0.0, (4.501 - 0.686) / 2, -(2.818 + 0.888) / 2])
+    hip = (23.7 + 2 * 30.1) / 50  # 1.678 rad beyond the joint range, of hip and thigh
+    calf = (35.55 + 2 * 20.06) / 50  # 1.5134 rad
+    assert action_map.to_radians(np.zeros(12)).tolist() == [0.0, 0.9, -1.8] * 4
+    expected = [0.863 + hip, 4.501 + hip - 0.9, -1.8 + 2.818 + calf]  # the calf's longer way is downwards
+    np.testing.assert_allclose(action_map.half_range, expected * 4)
+    np.testing.assert_allclose(action_map.half_range[:3], [2.541, 5.279, 2.5314])
+    np.testing.assert_allclose(action_map.to_radians(np.ones(12))[1], 4.501 + hip)
+    np.testing.assert_allclose(action_map.to_radians(-np.ones(12))[2], -2.818 - calf)
+
+
+def test_the_action_map_of_version_0_1_by_hand():
+    old = ActionMap.of_version_0_1(PDGains(50.0, 2.0))
+    hip, calf = (23.7 + 2 * 30.1) / 50, (35.55 + 2 * 20.06) / 50
+    np.testing.assert_allclose(old.center[:3], [0.0, (4.501 - 0.686) / 2, -(2.818 + 0.888) / 2])
+    np.testing.assert_allclose(old.half_range[:3], [0.863 + hip, (4.501 + 0.686) / 2 + hip, (2.818 - 0.888) / 2 + calf])
 
 
 @pytest.mark.parametrize("gains", GAINS, ids=str)
@@ -74,10 +84,9 @@ def test_every_torque_within_limits_has_an_action(gains):
 @pytest.mark.parametrize("gains", GAINS, ids=str)
 def test_action_range_is_no_wider_than_it_must_be(gains):
     action_map = ActionMap.for_gains(gains)
-    corner = gains.target(robot.TORQUE_LIMIT, robot.JOINT_UPPER, robot.SPEED_LIMIT)
-    np.testing.assert_allclose(action_map.from_radians(corner), np.ones(12), atol=1e-12)
-    corner = gains.target(-robot.TORQUE_LIMIT, robot.JOINT_LOWER, -robot.SPEED_LIMIT)
-    np.testing.assert_allclose((corner - action_map.center) / action_map.half_range, -np.ones(12), atol=1e-12)
+    highest = action_map.from_radians(gains.target(robot.TORQUE_LIMIT, robot.JOINT_UPPER, robot.SPEED_LIMIT))
+    lowest = action_map.from_radians(gains.target(-robot.TORQUE_LIMIT, robot.JOINT_LOWER, -robot.SPEED_LIMIT))
+    np.testing.assert_allclose(np.maximum(highest, -lowest), np.ones(12), atol=1e-12)
 
 
 def test_radians_round_trip_in_batches():

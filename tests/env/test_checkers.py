@@ -8,10 +8,12 @@ from gymnasium.utils.env_checker import check_env
 from stable_baselines3.common.env_checker import check_env as check_env_sb3
 
 from go1_mtl_gym import TASKS, env_id
+from go1_mtl_gym.sensing.observation import CHANNELS
 
 KWARGS = [
     {},
-    {"channels": ("command", "gravity", "phase", "last_action"), "history": 3},
+    {"channels": (), "tasks": tuple(TASKS)},
+    {"channels": tuple(CHANNELS), "history": 3},
     {"noise": True, "control_hz": 100, "kp": 30.0, "kd": 1.0},
     {"friction": 0.5, "payload_kg": 2.0, "action_delay_s": 0.025, "estimator_noise": True},
     {"randomization": True},
@@ -19,7 +21,7 @@ KWARGS = [
 ]
 
 
-@pytest.mark.parametrize("kwargs", KWARGS, ids=["plain", "channels", "noise", "real", "random", "filtered"])
+@pytest.mark.parametrize("kwargs", KWARGS, ids=["default", "plain", "channels", "noise", "real", "random", "filtered"])
 @pytest.mark.parametrize("task", [None, *TASKS])
 def test_both_checkers_pass_without_a_warning(task, kwargs):
     env = gymnasium.make(env_id(task), disable_env_checker=True, **kwargs)

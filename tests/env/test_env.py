@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import go1_mtl_gym
-from go1_mtl_gym import TASKS, InvalidInputError, PDGains, env_id, robot
+from go1_mtl_gym import PAPER_TASKS, TASKS, InvalidInputError, PDGains, env_id, robot
 from go1_mtl_gym.env import Go1Env
 
 INFO = {
@@ -29,8 +29,21 @@ def test_every_id_is_registered_with_and_without_the_module(task):
         observation, info = env.reset(seed=0)
         assert isinstance(env.unwrapped, Go1Env) and info["task"] == (task or info["task"])
         assert env.action_space == gymnasium.spaces.Box(-1, 1, (12,), np.float32)
-        assert env.observation_space.shape == (34 + len(TASKS),) and env.observation_space.contains(observation)
-    assert gymnasium.make("go1_mtl_gym:Go1Walk-v0", channels=("command",)).observation_space.shape == (37 + len(TASKS),)
+        assert env.observation_space.contains(observation)
+
+
+@pytest.mark.parametrize("task", [None, *TASKS])
+def test_without_arguments_it_is_the_environment_of_the_policy_in_the_package(task):
+    env = gymnasium.make(env_id(task)).unwrapped
+    drives = PAPER_TASKS if task in (None, *PAPER_TASKS) else (*PAPER_TASKS, task)
+    assert env.tasks == drives and env.layout.channels == ("command", "phase", "last_action")
+    assert env.observation_space.shape == (34 + 3 + 2 + 12 + len(drives),)
+    assert (env.control_hz, env.gains, env.config.history) == (50, PDGains(50.0, 2.0), 1)
+
+
+def test_without_channels_it_is_the_papers():
+    env = gymnasium.make("go1_mtl_gym:Go1Walk-v0", channels=())
+    assert env.observation_space.shape == (34 + 4,)
 
 
 def test_the_package_has_a_version_and_exports_what_it_lists():
@@ -41,8 +54,8 @@ def test_the_package_has_a_version_and_exports_what_it_lists():
 def test_multi_gait_draws_every_task_about_equally():
     env = Go1Env(None)
     drawn = [env.reset(seed=0 if i == 0 else None)[1]["task"] for i in range(240)]
-    counts = [drawn.count(name) for name in TASKS]
-    assert min(counts) > 25 and sum(counts) == 240
+    counts = [drawn.count(name) for name in PAPER_TASKS]
+    assert min(counts) > 40 and sum(counts) == 240
 
 
 @pytest.mark.parametrize("kwargs", [{}, {"noise": True, "history": 2, "channels": ("phase", "gravity")}], ids=str)
@@ -98,6 +111,18 @@ def test_an_episode_starts_standing_at_phase_zero():
     assert env.state.rpy.tolist() == [0, 0, 0] and not info["filtered_command"].any()
 
 
+@pytest.mark.parametrize("command", [(0.0, 0.0, 0.0), None], ids=["stand", "drawn"])
+@pytest.mark.parametrize("task", TASKS)
+def test_zero_action_stands_for_ten_seconds(task, command):
+    env = Go1Env(task)
+    env.reset(seed=0, options={"command": command})
+    for _ in range(500):
+        *_, terminated, truncated, info = env.step(np.zeros(12))
+        assert not terminated and not truncated
+    assert info["contacts"].all() and np.linalg.norm(env.state.position_w[:2]) < 0.05
+    assert env.state.position_w[2] == pytest.approx(robot.STANDING_HEIGHT, abs=0.03)
+
+
 def test_set_task_begins_the_gait_and_keeps_the_command():
     env = Go1Env("trot")
     env.reset(seed=0, options={"command": (0.3, 0.0, 0.1)})
@@ -107,7 +132,7 @@ def test_set_task_begins_the_gait_and_keeps_the_command():
     assert info["phase"] == pytest.approx(0.3) and env.state.phase == 0.0 and env.state.gait.name == "walk"
     observation, _, _, _, info = env.step(env.action_map.from_radians(robot.HOME_POSE))
     assert info["phase"] == pytest.approx(0.02 / 0.6) and info["task"] == "walk"
-    assert observation[34:].tolist() == [0, 0, 0, 1, 0, 0] and info["command"].tolist() == [0.3, 0.0, 0.1]
+    assert observation[-4:].tolist() == [0, 0, 0, 1] and info["command"].tolist() == [0.3, 0.0, 0.1]
 
 
 def test_set_command_is_seen_through_the_filter():

@@ -136,7 +136,7 @@ def test_who_has_it_or_cannot_have_it_is_told(trained):
     with pytest.raises(InvalidInputError, match="pooled"):
         pooled.add_task("pace")
     unnamed = MultiHeadPolicy(env.observation_space, env.action_space, n_tasks=4)
-    with pytest.raises(InvalidInputError, match="its tasks have no names"):
+    with pytest.raises(InvalidInputError, match="without one its tasks have no names"):
         unnamed.add_task("pace")
 
 

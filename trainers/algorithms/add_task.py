@@ -1,6 +1,7 @@
 """New gaits for a trained student: one more head, which learns alone or together with the rest."""
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import torch
@@ -52,7 +53,7 @@ def learn_task(
     if policy.pooled or not len(dataset):
         kind = "pooled policy" if policy.pooled else "policy with heads"
         raise InvalidInputError(f"a policy with heads and rows were expected, got a {kind} and {len(dataset)} rows")
-    more = {"logger": logger, "progress": progress, "fit_normalization": False}
+    more: dict[str, Any] = {"logger": logger, "progress": progress, "fit_normalization": False}
     if rehearsal is None:
         names = tuple(dataset.per_task())
         rows = trunk_features(policy, dataset).with_tasks(names)
@@ -72,10 +73,10 @@ def closest_task(policy: MultiHeadPolicy, dataset: Demonstrations) -> str:
     Raises:
         InvalidInputError: if there are no rows, or their contract differs from the policy's in more than the tasks.
     """
-    contract = _named(policy)
+    contract = policy.named_contract()
     contract.check(dataset.contract, "the policy", "the demonstrations", ignore=("tasks",))
     tasks, (seen, _) = contract.tasks, np.split(dataset.obs, [-len(dataset.tasks)], axis=1)
-    errors = {}
+    errors: dict[str, float] = {}
     for name in tasks:
         as_if = np.tile(np.eye(len(tasks), dtype=np.float32)[tasks.index(name)], (len(seen), 1))
         rows = dataclasses.replace(dataset, obs=np.hstack([seen, as_if]), contract=contract)
@@ -83,17 +84,6 @@ def closest_task(policy: MultiHeadPolicy, dataset: Demonstrations) -> str:
     if not errors:
         raise InvalidInputError("rows of the new task were expected, got none")
     return min(errors, key=errors.__getitem__)
-
-
-def _named(policy: MultiHeadPolicy) -> PolicyContract:
-    """The policy's contract; it names the tasks.
-
-    Raises:
-        InvalidInputError: if the policy has none.
-    """
-    if policy.contract is None:
-        raise InvalidInputError("a policy with a contract was expected: its tasks have no names")
-    return policy.contract
 
 
 @torch.no_grad()
@@ -110,7 +100,7 @@ def trunk_features(policy: MultiHeadPolicy, dataset: Demonstrations) -> Demonstr
     Raises:
         InvalidInputError: if the rows do not belong to the policy's contract, or a task is none of the policy's.
     """
-    contract = _named(policy)
+    contract = policy.named_contract()
     rows = dataset.fitted_to(contract)
     obs = torch.as_tensor(rows.obs).split(BATCH)
     features = [policy.actor.trunk(policy.normalized(each.to(policy.device))).cpu() for each in obs]

@@ -107,6 +107,10 @@ class BCTrainer(imitation_bc.BC):
         logger: shared log, or None for a silent one.
     """
 
+    _policy: MultiHeadPolicy
+    _bc_logger: "_StepLogger"
+    loss_calculator: losses.MultiTaskLoss  # type: ignore[assignment]  # imitation reads its result's `loss`, no more
+
     def __init__(
         self, policy: MultiHeadPolicy, config: BCConfig | None = None, logger: HierarchicalLogger | None = None
     ) -> None:
@@ -122,6 +126,11 @@ class BCTrainer(imitation_bc.BC):
         )
         self.steps_done = 0
         self._bc_logger = _StepLogger(self.logger)
+
+    @property
+    def policy(self) -> MultiHeadPolicy:
+        """The student."""
+        return self._policy
 
     def fit(
         self,
@@ -154,7 +163,7 @@ class BCTrainer(imitation_bc.BC):
         self.batch_size = self.minibatch_size = batch_size
         seed = config.seed if seed is None else seed
         batches = TensorBatches(dataset, batch_size, seed, policy.device, weights)
-        self.set_demonstrations(batches)
+        self.set_demonstrations(batches)  # type: ignore[arg-type]  # imitation's TypedDict is invariant
         self.loss_calculator = losses.MultiTaskLoss(
             dataset.tasks, dataset.half_range, config.space, batches.rows, config.autocast
         )

@@ -18,7 +18,7 @@ from trainers.algorithms.bc import BCConfig, BCHistory, BCTrainer
 from trainers.algorithms.dagger_collector import BlockCollector
 from trainers.data.collection import ShardMismatchError
 from trainers.data.demonstrations import Demonstrations
-from trainers.data.environments import contracts_of, derive_seed
+from trainers.data.environments import contracts_of, derive_seed, flat_obs
 from trainers.policies.expert_policy import ExpertPolicy
 from trainers.policies.multi_head import MultiHeadPolicy
 from trainers.policies.stateful import Learner
@@ -93,6 +93,8 @@ class DAggerTrainer(imitation_dagger.DAggerTrainer):
         ShardMismatchError: if `scratch_dir` was filled with other settings, or on another base.
     """
 
+    bc_trainer: BCTrainer
+
     def __init__(
         self,
         venv: VecEnv,
@@ -126,6 +128,11 @@ class DAggerTrainer(imitation_dagger.DAggerTrainer):
         self.expert_policy = ExpertPolicy(venv)
         self._rounds: list[Demonstrations] = []
         self._claim_folder()
+
+    @property
+    def policy(self) -> MultiHeadPolicy:
+        """The student."""
+        return self.bc_trainer.policy
 
     # -- Rounds --------------------------------------------------------------------------------------------------------
 
@@ -169,7 +176,8 @@ class DAggerTrainer(imitation_dagger.DAggerTrainer):
             counts = {name: getattr(collector, name) for name in ("learner_fraction", "falls", "takeovers")}
             for name, value in counts.items():
                 self.logger.record(f"dagger/{name}", value)
-            rows = dataclasses.replace(self.base, **collector.recorded(), meta=meta | counts)
+            arrays: dict[str, Any] = collector.recorded()
+            rows = dataclasses.replace(self.base, **arrays, meta=meta | counts)
             rows.save(path)
         self._rounds.append(rows)
         return rows
@@ -247,12 +255,13 @@ class DAggerTrainer(imitation_dagger.DAggerTrainer):
             total=collector.wanted, desc=f"DAgger {self.round_num}", unit="row", disable=not self.progress
         ) as bar:
             while not collector.finished:
-                obs, *_ = collector.step(self.expert_policy.predict(obs)[0])
+                seen, *_ = collector.step(self.expert_policy.predict(obs)[0])
+                obs = flat_obs(seen)
                 bar.update(collector.rows - bar.n)
 
     def _rows_per_env(self, seconds_per_task: float) -> np.ndarray:
         """Share each task's rows among its environments, by the task ids of their first observations."""
-        task = self.venv.reset()[:, -len(self.base.tasks) :].argmax(axis=1)
+        task = flat_obs(self.venv.reset())[:, -len(self.base.tasks) :].argmax(axis=1)
         count = np.bincount(task, minlength=len(self.base.tasks))
         return np.ceil(seconds_per_task * self.base.control_hz / count[task]).astype(int)
 

@@ -9,6 +9,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
 from trainers.data.collection import BEFORE_FALL_S
+from trainers.data.environments import flat_obs
 from trainers.policies.stateful import Learner
 
 
@@ -48,6 +49,9 @@ class BlockCollector(InteractiveTrajectoryCollector):
         InvalidInputError: if an argument is not as described.
     """
 
+    _last_obs: np.ndarray
+    _last_user_actions: np.ndarray
+
     def __init__(
         self,
         venv: VecEnv,
@@ -86,7 +90,7 @@ class BlockCollector(InteractiveTrajectoryCollector):
         self._left = np.zeros(n, dtype=int)
         self._experts_turn = np.zeros(n, dtype=bool)
         self._finished = self._wanted == 0
-        self._last_obs = self.venv.reset()
+        self._last_obs = flat_obs(self.venv.reset())
         self._begins = np.ones(n, dtype=bool)
         self._is_reset = True
         return self._last_obs
@@ -113,8 +117,9 @@ class BlockCollector(InteractiveTrajectoryCollector):
 
     def step_wait(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, Any]]]:
         """Record the states that were left and what the expert would have done in them."""
-        obs, rewards, dones, infos = self.venv.step_wait()
-        for i in np.flatnonzero(~self._finished):
+        seen, rewards, dones, infos = self.venv.step_wait()
+        obs = flat_obs(seen)
+        for i in np.flatnonzero(~self._finished).tolist():
             self._obs[i].append(self._last_obs[i].copy())
             self._acts[i].append(self._last_user_actions[i])
             if dones[i]:

@@ -104,8 +104,9 @@ class MultiTaskLoss:
         if self._known is None:
             task = policy.task_index(obs)
             return task, torch.bincount(task, minlength=len(self.tasks))
-        self._known = tuple(part.to(obs.device) for part in self._known)
-        return self._known
+        task, rows = self._known
+        self._known = known = task.to(obs.device), rows.to(obs.device)
+        return known
 
 
 def _groups_of(rows: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:

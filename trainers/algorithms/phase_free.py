@@ -64,10 +64,10 @@ def train_phase(
         InvalidInputError: if the rows do not fit, or there are none.
     """
     config = config or PhaseConfig()
-    seen, target = inputs_and_phase(estimator, rows)
+    seen, phase = inputs_and_phase(estimator, rows)
     device = estimator.normalizer.shift.device
     estimator.normalizer.set(*norm.fit(seen, "mean_std"))
-    inputs, target = torch.as_tensor(seen, device=device), torch.as_tensor(target, device=device)
+    inputs, target = torch.as_tensor(seen, device=device), torch.as_tensor(phase, device=device)
     weights = list(estimator.network.parameters())
     optimizer, schedule = adamw_one_cycle(weights, config.learning_rate, config.weight_decay, config.steps)
     rng = np.random.default_rng(config.seed)

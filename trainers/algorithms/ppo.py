@@ -1,17 +1,18 @@
 """Reinforcement learning that goes on from a trained policy instead of from nothing."""
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecEnv
+from torch import nn
 from tqdm.auto import tqdm
 
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import number_in
 from trainers.algorithms.optimizer import adamw_one_cycle
-from trainers.data.environments import contracts_of
+from trainers.data.environments import contracts_of, flat_obs
 from trainers.policies.multi_head import MultiHeadPolicy
 from trainers.policies.normalization import SMALLEST_SCALE
 
@@ -102,7 +103,7 @@ def ppo_from_policy(
         model.policy.log_std.copy_(torch.log(exploration_rad / scale))
     if critic_steps:
         obs, returns = _earned(model, max(1, int(critic_steps) // venv.num_envs), progress)
-        _fit_critic(model.policy, obs, returns, seed)
+        _fit_critic(cast(MultiHeadPolicy, model.policy), obs, returns, seed)
     return model
 
 
@@ -111,16 +112,22 @@ def _earned(model: PPO, steps: int, progress: bool) -> tuple[torch.Tensor, torch
 
     Where an episode is cut by its time, and at the end, the mean reward is taken to go on for ever.
     """
-    venv = model.get_env()
-    seen, rewards, falls, cuts = [], [], [], []
-    obs = venv.reset()
+    venv = cast(VecEnv, model.get_env())
+    seen: list[np.ndarray] = []
+    rewards: list[np.ndarray] = []
+    falls: list[np.ndarray] = []
+    cuts: list[np.ndarray] = []
+    obs = flat_obs(venv.reset())
     for _ in tqdm(range(steps), "critic", unit="step", disable=not progress):
         with torch.no_grad():
             actions = model.policy(torch.as_tensor(obs))[0].numpy()
         seen.append(obs)
-        obs, reward, done, infos = venv.step(np.clip(actions, -1.0, 1.0))
+        after, reward, done, infos = venv.step(np.clip(actions, -1.0, 1.0))
+        obs = flat_obs(after)
         cut = np.array([info.get("TimeLimit.truncated", False) for info in infos])
-        rewards.append(reward), falls.append(done & ~cut), cuts.append(cut)
+        rewards.append(reward)
+        falls.append(done & ~cut)
+        cuts.append(cut)
     beyond = np.mean(rewards) / (1.0 - model.gamma)
     returns, later = np.empty((steps, venv.num_envs)), np.full(venv.num_envs, beyond)
     for i in reversed(range(steps)):
@@ -131,7 +138,7 @@ def _earned(model: PPO, steps: int, progress: bool) -> tuple[torch.Tensor, torch
 
 def _fit_critic(policy: MultiHeadPolicy, obs: torch.Tensor, returns: torch.Tensor, seed: int) -> None:
     """Least squares; the critic's output begins at the mean of the returns and in units of their deviation."""
-    output, rng = policy.critic[-1], np.random.default_rng(seed)
+    output, rng = cast(nn.Linear, policy.critic[-1]), np.random.default_rng(seed)
     with torch.no_grad():
         output.weight.mul_(max(float(returns.std()), SMALLEST_SCALE))
         output.bias.fill_(returns.mean())

@@ -7,6 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+import gymnasium
 import joblib
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -17,7 +18,7 @@ from go1_mtl_gym.errors import Go1Error, InvalidInputError
 from go1_mtl_gym.sensing.observation import ObservationLayout
 from go1_mtl_gym.validation import finite_vector, integer_in
 from trainers.data.demonstrations import Demonstrations
-from trainers.data.environments import EnvFactory, PerturbationConfig, WithTasks, derive_seed, make_env
+from trainers.data.environments import EnvFactory, PerturbationConfig, WithTasks, base_env, derive_seed, make_env
 from trainers.utils.files import json_form
 from trainers.utils.processes import keep_interrupts
 from trainers.utils.validation import positive
@@ -58,7 +59,7 @@ class CollectJob:
     task: str
     seed: int
     seconds: float = 30.0
-    command: tuple[float, float, float] | None = None
+    command: Sequence[float] | None = None
     perturbation: PerturbationConfig | None = None
     env_kwargs: dict[str, Any] = dataclasses.field(default_factory=dict)
 
@@ -100,7 +101,12 @@ def collect(
     result depends on the arguments alone.
 
     Args:
-        task, command, seed, seconds, perturbation, env_kwargs: as in `CollectJob`.
+        task: name of the task that every episode begins in.
+        command: as in `CollectJob`.
+        seed: of everything random.
+        seconds: duration of the kept rows [s].
+        perturbation: as in `CollectJob`.
+        env_kwargs: of the environment.
         make_env: another environment factory.
 
     Raises:
@@ -111,7 +117,7 @@ def collect(
         perturbation = dataclasses.replace(perturbation, command_interval=None)
     env = make_env(task, perturbation, **{"episode_s": EPISODE_S, **job.env_kwargs})
     try:
-        return _record(env, job, lambda obs: env.unwrapped.expert_action())
+        return _record(env, job, lambda obs: base_env(env).expert_action())
     finally:
         env.close()
 
@@ -131,7 +137,10 @@ def watch(
 
     Args:
         policy: with ``predict(obs, deterministic=True)``, `env_kwargs` and `contract`, of one frame of proprioception.
-        task, seed, seconds, perturbation: as in `CollectJob`.
+        task: name of the task that every episode begins in.
+        seed: of everything random.
+        seconds: duration of the kept rows [s].
+        perturbation: as in `CollectJob`.
         history: frames of proprioception that are recorded; the policy sees the newest.
         make_env: another environment factory.
         env_kwargs: of the environment; on top of the policy's own ``env_kwargs``.
@@ -146,7 +155,7 @@ def watch(
     job = CollectJob(task, seed, seconds, None, perturbation, {**policy.env_kwargs, **env_kwargs, "history": history})
     env = make_env(task, perturbation, **{"episode_s": EPISODE_S, **job.env_kwargs})
     try:
-        contract = env.unwrapped.contract
+        contract = base_env(env).contract
         layout = ObservationLayout(contract.tasks, contract.channels, contract.history)
         newest = ObservationLayout(contract.tasks, contract.channels)
         policy.contract.check(contract.with_terms(terms_of(newest)), "the policy", "the environment")
@@ -156,9 +165,9 @@ def watch(
         env.close()
 
 
-def _record(env: Any, job: CollectJob, act: Callable[[np.ndarray], np.ndarray]) -> Demonstrations:
+def _record(env: gymnasium.Env, job: CollectJob, act: Callable[[np.ndarray], np.ndarray]) -> Demonstrations:
     """The rows of a job: what was seen, and what `act` made of it; it also drives."""
-    base = env.unwrapped
+    base = base_env(env)
     wanted = round(job.seconds * base.control_hz)
     obs_rows: list[np.ndarray] = []
     act_rows: list[np.ndarray] = []

@@ -203,7 +203,9 @@ class Demonstrations:
         for i, part in enumerate(parts[1:], start=1):
             first.contract.check(part.contract, "demonstrations 0", f"demonstrations {i}")
         agreed = {key: value for key, value in first.meta.items() if all(p.meta.get(key) == value for p in parts)}
-        arrays = {name: np.concatenate([getattr(p, name) for p in parts]) for name in ("obs", "acts", "starts")}
+        arrays: dict[str, Any] = {
+            name: np.concatenate([getattr(p, name) for p in parts]) for name in ("obs", "acts", "starts")
+        }
         return dataclasses.replace(first, **arrays, meta=agreed)
 
     def to_trajectories(self) -> "list[Trajectory]":

@@ -5,25 +5,66 @@ import functools
 import multiprocessing
 import zlib
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 import gymnasium
 import numpy as np
+from numpy.typing import ArrayLike
 
 import go1_mtl_gym
+from go1_mtl_gym.actuation import ActionMap
 from go1_mtl_gym.contract import PolicyContract
+from go1_mtl_gym.deprecation import renamed_arguments
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
 from go1_mtl_gym.validation import interval_s, number_in, one_of
 from trainers.utils.processes import keep_interrupts
 
+if TYPE_CHECKING:
+    from stable_baselines3.common.vec_env import VecEnv
+
 EnvFactory = Callable[..., gymnasium.Env]
 """What `make_env` is: (task, perturbation=None, **env_kwargs) -> environment with a method ``expert_action``."""
+
+
+class Go1Like(Protocol):
+    """What the trainers ask of an environment beneath its wrappers, beyond Gymnasium; `go1_mtl_gym.Go1Env` has it."""
+
+    @property
+    def contract(self) -> PolicyContract:
+        """What gives observations and actions their meaning."""
+
+    @property
+    def control_hz(self) -> float:
+        """Steps per second."""
+
+    @property
+    def action_map(self) -> ActionMap:
+        """From actions to joint targets [rad] and back."""
+
+    @property
+    def state(self) -> Any:
+        """What the expert is shown where there is no `estimated_state`."""
+
+    def expert_action(self) -> np.ndarray:
+        """The expert's action at the present state, shape (12,); without side effects."""
+
+    def set_command(self, command: ArrayLike) -> None:
+        """Ask for another (vx [m/s], vy [m/s], yaw rate [rad/s])."""
+
+    def set_task(self, task: str) -> None:
+        """Change the task while running."""
+
+
+def base_env(env: gymnasium.Env) -> Go1Like:
+    """The environment beneath its wrappers, which Gymnasium gives without saying what it can do."""
+    return cast(Go1Like, env.unwrapped)
 
 
 class WorkerError(Go1Error, RuntimeError):
     """A process that was to step an environment is gone."""
 
 
+@renamed_arguments(kick="push", kick_interval="push_interval", corner_share="corner_fraction")
 @dataclasses.dataclass(frozen=True)
 class PerturbationConfig:
     """How demonstrations are disturbed; see `go1_mtl_gym.PerturbationWrapper`.
@@ -61,11 +102,11 @@ class ExpertAccess(gymnasium.Wrapper):
     @property
     def contract(self) -> PolicyContract:
         """What gives observations and actions their meaning."""
-        return self.env.unwrapped.contract
+        return base_env(self.env).contract
 
     def expert_action(self) -> np.ndarray:
         """The expert's action at the present state, shape (12,)."""
-        return self.env.unwrapped.expert_action()
+        return base_env(self.env).expert_action()
 
 
 def make_env(task: str | None, perturbation: PerturbationConfig | None = None, **env_kwargs: Any) -> gymnasium.Env:
@@ -94,7 +135,7 @@ def make_venv(
     perturbation: PerturbationConfig | None = None,
     subproc: bool = False,
     make_env: EnvFactory = make_env,
-) -> Any:
+) -> "VecEnv":
     """A stable-baselines3 vector environment with `per_task` environments of every task, in the order of `tasks`.
 
     Args:
@@ -110,34 +151,53 @@ def make_venv(
         InvalidInputError: if `per_task` is less than 1.
         WorkerError: if a process ends before it has made its environment.
     """
-    from stable_baselines3.common.vec_env import DummyVecEnv, SubprocVecEnv
+    from stable_baselines3.common.vec_env import DummyVecEnv
 
     if per_task < 1:
         raise InvalidInputError(f"per_task must be at least 1, got {per_task}")
     kwargs = dict(env_kwargs or {})
     calls = [functools.partial(make_env, task, perturbation, **kwargs) for task in tasks]
-    thunks = [WithTasks(call) for call in calls for _ in range(per_task)]
-    if not subproc:
-        return DummyVecEnv(thunks)
+    thunks: list[Callable[[], gymnasium.Env]] = [WithTasks(call) for call in calls for _ in range(per_task)]
+    return _in_processes(thunks) if subproc else DummyVecEnv(thunks)
+
+
+def _in_processes(thunks: list[Callable[[], gymnasium.Env]]) -> "VecEnv":
+    """A vector environment with a process per environment, which leaves Ctrl-C to this one."""
+    from stable_baselines3.common.vec_env import SubprocVecEnv
+
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         raise SystemExit(1)  # a worker that imports a script without a main guard; the script is told, by its own error
+    venv: VecEnv | None = None
     try:
         with keep_interrupts():
-            return SubprocVecEnv(thunks, start_method="spawn")
+            venv = SubprocVecEnv(thunks, start_method="spawn")
     except (EOFError, ConnectionError):
         raise WorkerError(
             "a worker process ended before it had made its environment; a script that makes environments with "
             'subproc=True must do so below `if __name__ == "__main__":`, because every worker imports it again'
         ) from None
+    except KeyboardInterrupt:
+        if venv is not None:  # it came while the processes began
+            venv.close()
+        raise
+    return venv
 
 
-def contracts_of(venv: Any) -> tuple[PolicyContract, ...]:
+def contracts_of(venv: "VecEnv") -> tuple[PolicyContract, ...]:
     """The different contracts of the environments in a stable-baselines3 vector environment; none if they have none."""
     try:
         contracts = venv.get_attr("contract")
     except AttributeError:
         return ()
     return tuple(dict.fromkeys(contracts))
+
+
+def flat_obs(obs: Any) -> np.ndarray:
+    """What a vector environment's `reset` or `step` gave, as the array (n_envs, D) that a flat Box makes it.
+
+    stable-baselines3 annotates it for dictionaries and tuples too.
+    """
+    return cast(np.ndarray, obs)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -7,8 +7,8 @@ import numpy as np
 
 from go1_mtl_gym import TASKS
 from go1_mtl_gym.errors import InvalidInputError
-from trainers.data.environments import EnvFactory, derive_seed, make_env
-from trainers.evaluation.rollout import Rollout, controller, opened, run_all
+from trainers.data.environments import EnvFactory, base_env, derive_seed, make_env
+from trainers.evaluation.rollout import Rollout, check_agent, opened, run_all
 from trainers.evaluation.scoring import ClosedLoopResult, EpisodeRecord, score
 from trainers.utils.validation import refuse_overridden
 
@@ -65,7 +65,7 @@ def evaluate(
     if command_interval is not None and not command_interval > 0:
         raise InvalidInputError(f"command_interval must be None or positive, got {command_interval}")
     refuse_overridden(env_kwargs, episode_s="seconds", task="task")
-    controller(policy_or_expert, None)
+    check_agent(policy_or_expert)
     kwargs = {**getattr(policy_or_expert, "env_kwargs", {}), **env_kwargs, "episode_s": seconds}
 
     def call(i: int) -> tuple[Any, ...]:
@@ -93,7 +93,7 @@ def _episode(
     if command is not None or corners:
         options["command"] = tuple(draw(rng).tolist()) if command is None else command
     with opened(make_env, task, env_kwargs) as env:
-        base = env.unwrapped
+        base = base_env(env)
         rollout = Rollout(env, policy_or_expert, seed, options)
         given = [rollout.command]
         steps = round(env_kwargs["episode_s"] * base.control_hz)

@@ -7,8 +7,8 @@ import numpy as np
 from go1_mtl_gym import TASKS
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import one_of
-from trainers.data.environments import EnvFactory, derive_seed, make_env
-from trainers.evaluation.rollout import Rollout, controller, opened, run_all
+from trainers.data.environments import EnvFactory, base_env, derive_seed, make_env
+from trainers.evaluation.rollout import Rollout, check_agent, opened, run_all
 from trainers.evaluation.scoring import ClosedLoopResult, EpisodeRecord, score
 from trainers.utils.validation import refuse_overridden
 
@@ -46,7 +46,8 @@ def evaluate_transition(
         n_jobs: processes.
         progress: show a bar.
         make_env: another environment factory.
-        env_kwargs: of the environment, which must know both tasks; on top of the policy's own ``env_kwargs``.
+        env_kwargs: of the environment, on top of the policy's own ``env_kwargs``. It must know both tasks; unless told
+            otherwise, it knows all that are registered.
 
     Returns:
         Its task is "FIRST to SECOND", its seconds are `after_s`.
@@ -55,14 +56,14 @@ def evaluate_transition(
         InvalidInputError: if an argument is not as described.
     """
     refuse_overridden(env_kwargs, episode_s="before_s and after_s", task="first")
-    kwargs = {**getattr(policy_or_expert, "env_kwargs", {}), **env_kwargs}
+    kwargs = {"tasks": tuple(TASKS), **getattr(policy_or_expert, "env_kwargs", {}), **env_kwargs}
     for task in (first, second):
-        one_of(task, tuple(kwargs.get("tasks") or TASKS), "task")
+        one_of(task, tuple(kwargs["tasks"]), "task")
     if trials < 1 or not (before_s >= 0 and after_s > 0):
         raise InvalidInputError(
             f"trials must be >= 1, before_s >= 0 and after_s > 0, got {trials}, {before_s} and {after_s}"
         )
-    controller(policy_or_expert, None)
+    check_agent(policy_or_expert)
     kwargs["episode_s"] = before_s + TASKS[first].gait.period + after_s + 1.0
 
     def call(i: int) -> tuple[Any, ...]:
@@ -89,7 +90,7 @@ def _trial(
     command = tuple((rng.uniform(-1.0, 1.0, 3) * span).tolist())
     before_s += rng.uniform() * TASKS[first].gait.period
     with opened(make_env, first, env_kwargs) as env:
-        base = env.unwrapped
+        base = base_env(env)
         rollout = Rollout(env, policy_or_expert, seed, {"task": first, "command": command})
         rollout.walk(round(before_s * base.control_hz))
         if not rollout.fallen:

@@ -4,6 +4,7 @@ import contextlib
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
+import gymnasium
 import joblib
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -11,35 +12,46 @@ from tqdm.auto import tqdm
 
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.expert import check_expert_fits
-from trainers.data.environments import EnvFactory, WithTasks
+from trainers.data.environments import EnvFactory, Go1Like, WithTasks, base_env
 from trainers.evaluation.scoring import Series
 from trainers.policies.stateful import Learner
 from trainers.utils.processes import keep_interrupts
 
 
-def controller(policy_or_expert: Any, env: Any) -> Callable[[np.ndarray], np.ndarray]:
+def check_agent(policy_or_expert: Any) -> None:
+    """Refuse what can neither be followed nor asked.
+
+    Args:
+        policy_or_expert: as in `trainers.evaluate`.
+
+    Raises:
+        InvalidInputError: if it is neither a policy nor an expert.
+    """
+    named = isinstance(policy_or_expert, str) and policy_or_expert == "expert"
+    if not (named or hasattr(policy_or_expert, "predict") or hasattr(policy_or_expert, "action")):
+        raise InvalidInputError(
+            f'expected something with predict(obs), something with action(state), or "expert"; got {policy_or_expert!r}'
+        )
+
+
+def controller(policy_or_expert: Any, env: Go1Like) -> Callable[[np.ndarray], np.ndarray]:
     """What turns the observations of one episode of `env`, in their order, into actions; make one per episode.
 
     Args:
         policy_or_expert: as in `trainers.evaluate`.
-        env: the environment; None only looks at what the other is.
+        env: the environment beneath its wrappers.
 
     Raises:
         InvalidInputError: if it is neither a policy nor an expert, or was made for another environment.
     """
-    if isinstance(policy_or_expert, str) and policy_or_expert == "expert":
+    check_agent(policy_or_expert)
+    if isinstance(policy_or_expert, str):
         return lambda obs: env.expert_action()
     if hasattr(policy_or_expert, "predict"):
-        if env is not None:
-            _check_contract(policy_or_expert, env)
+        _check_contract(policy_or_expert, env)
         return _follow(Learner(policy_or_expert))
-    if hasattr(policy_or_expert, "action"):
-        if env is not None:
-            _check_expert(policy_or_expert, env)
-        return lambda obs: env.action_map.from_radians(policy_or_expert.action(_expert_state(env))).astype(np.float32)
-    raise InvalidInputError(
-        f'expected something with predict(obs), something with action(state), or "expert"; got {policy_or_expert!r}'
-    )
+    _check_expert(policy_or_expert, env)
+    return lambda obs: env.action_map.from_radians(policy_or_expert.action(_expert_state(env))).astype(np.float32)
 
 
 def _check_contract(policy: Any, env: Any) -> None:
@@ -66,21 +78,23 @@ def _follow(learner: Learner) -> Callable[[np.ndarray], np.ndarray]:
     return act
 
 
-def begin(env: Any, policy_or_expert: Any, seed: int, options: dict[str, Any]) -> tuple[np.ndarray, dict[str, Any]]:
+def begin(
+    env: gymnasium.Env, policy_or_expert: Any, seed: int, options: dict[str, Any]
+) -> tuple[np.ndarray, dict[str, Any]]:
     """Reset an environment, and an expert that is no policy with it; returns observation and info."""
     obs, info = env.reset(seed=seed, options=options)
     if hasattr(policy_or_expert, "reset") and not hasattr(policy_or_expert, "predict"):
-        policy_or_expert.reset(_expert_state(env.unwrapped))
+        policy_or_expert.reset(_expert_state(base_env(env)))
     return obs, info
 
 
-def _expert_state(env: Any) -> Any:
+def _expert_state(env: Go1Like) -> Any:
     """What the environment shows an expert."""
     return env.estimated_state if hasattr(env, "estimated_state") else env.state
 
 
 @contextlib.contextmanager
-def opened(make_env: EnvFactory, task: str, env_kwargs: dict[str, Any]) -> Iterator[Any]:
+def opened(make_env: EnvFactory, task: str, env_kwargs: dict[str, Any]) -> Iterator[gymnasium.Env]:
     """An environment that is closed afterwards; linear algebra uses one thread meanwhile."""
     env = make_env(task, None, **env_kwargs)
     try:
@@ -104,11 +118,12 @@ class Rollout:
         fallen: whether it ended in a fall.
     """
 
-    def __init__(self, env: Any, policy_or_expert: Any, seed: int, options: dict[str, Any]) -> None:
+    def __init__(self, env: gymnasium.Env, policy_or_expert: Any, seed: int, options: dict[str, Any]) -> None:
         self._env = env
-        self._act = controller(policy_or_expert, env.unwrapped)
+        self._act = controller(policy_or_expert, base_env(env))
         self._obs, self._info = begin(env, policy_or_expert, seed, options)
-        self.command = tuple(float(value) for value in self._info["command"])
+        forward, sideways, yaw_rate = (float(value) for value in self._info["command"])
+        self.command = (forward, sideways, yaw_rate)
         self.fallen = self._over = False
 
     def walk(self, steps: int, before_step: Callable[[int], None] | None = None) -> Series:

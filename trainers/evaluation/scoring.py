@@ -140,7 +140,8 @@ def score(
     Args:
         series: from the time on that the gait was asked for.
         fallen: whether it ended in a fall.
-        seed, commands: kept in the record.
+        seed: kept in the record.
+        commands: likewise.
         gait: what was asked for.
         control_hz: steps per second.
     """

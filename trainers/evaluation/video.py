@@ -3,14 +3,16 @@
 import math
 from collections.abc import Mapping
 from os import PathLike
-from typing import Any
+from typing import Any, cast
 
+import gymnasium
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 from threadpoolctl import threadpool_limits
 
+from go1_mtl_gym import Go1Env
 from go1_mtl_gym.errors import InvalidInputError
-from trainers.data.environments import make_env
+from trainers.data.environments import base_env, make_env
 from trainers.evaluation.rollout import begin, controller
 from trainers.utils.files import write_atomically
 from trainers.utils.validation import refuse_overridden
@@ -48,7 +50,8 @@ def record_frames(
         command: (vx [m/s], vy [m/s], yaw rate [rad/s]).
         seed: of the reset.
         fps: pictures per second, at most the control rate.
-        width, height: of a picture [pixels].
+        width: of a picture [pixels].
+        height: likewise.
         env_kwargs: of the environment; on top of the policy's own ``env_kwargs``.
 
     Returns:
@@ -60,14 +63,14 @@ def record_frames(
     """
     if not (seconds > 0 and 0 < fps <= MAX_FPS):
         raise InvalidInputError(f"seconds must be > 0 and fps from 1 to {MAX_FPS}, got {seconds} and {fps}")
-    if min(width, height) < 16 or max(width, height) > 4096:
-        raise InvalidInputError(f"width and height must be from 16 to 4096 pixels, got {width} and {height}")
+    if min(width, height) < 16 or max(width, height) > 2048:
+        raise InvalidInputError(f"width and height must be from 16 to 2048 pixels, got {width} and {height}")
     refuse_overridden(env_kwargs, episode_s="seconds", render_mode="record_frames", task="task")
     kwargs = {**getattr(policy_or_expert, "env_kwargs", {}), **env_kwargs, "episode_s": seconds + 1.0}
     kwargs |= {"render_mode": "rgb_array", "width": 2 * width, "height": 2 * height}
     env = make_env(task, None, **kwargs)
     try:
-        visual = env.unwrapped.simulation.model.vis
+        visual = cast(Go1Env, env.unwrapped).simulation.model.vis
         visual.quality.offsamples, visual.quality.shadowsize = 0, SHADOW_PIXELS
         visual.global_.offwidth, visual.global_.offheight = 2 * width, 2 * height
         options = {"task": task, "command": command}
@@ -77,22 +80,25 @@ def record_frames(
         env.close()
 
 
-def _film(env: Any, policy_or_expert: Any, options: dict[str, Any], seed: int, count: int, fps: int) -> np.ndarray:
-    base = env.unwrapped
+def _film(
+    env: gymnasium.Env, policy_or_expert: Any, options: dict[str, Any], seed: int, count: int, fps: int
+) -> np.ndarray:
+    base = base_env(env)
     act = controller(policy_or_expert, base)
     obs, _ = begin(env, policy_or_expert, seed, options)
-    frames = [_averaged(env.render())]
+    frames = [_picture(env)]
     step, terminated = 0, False
     while len(frames) < count:
         while step < round(len(frames) * base.control_hz / fps) and not terminated:
             obs, _, terminated, _, _ = env.step(act(obs))
             step += 1
-        frames.append(frames[-1] if terminated else _averaged(env.render()))
+        frames.append(frames[-1] if terminated else _picture(env))
     return np.stack(frames)
 
 
-def _averaged(picture: np.ndarray) -> np.ndarray:
-    """Half the size in both directions."""
+def _picture(env: gymnasium.Env) -> np.ndarray:
+    """What the environment draws, in half the size in both directions."""
+    picture = cast(np.ndarray, env.render())  # Gymnasium's annotation leaves open what it is
     height, width, _ = picture.shape
     blocks = picture.reshape(height // 2, 2, width // 2, 2, 3).astype(np.uint16)
     return ((blocks.sum((1, 3)) + 2) // 4).astype(np.uint8)
@@ -133,8 +139,8 @@ def _labelled(picture: np.ndarray, name: str) -> np.ndarray:
     draw = ImageDraw.Draw(image)
     font = ImageFont.load_default(size=max(10, image.height // 13))
     corner = (image.height // 20, image.height // 24)
-    outline = {"stroke_width": max(1, image.height // 120), "stroke_fill": (40, 44, 52)}
-    draw.text(corner, name, font=font, fill=(255, 255, 255), **outline)
+    outline = max(1, image.height // 120)
+    draw.text(corner, name, (255, 255, 255), font, stroke_width=outline, stroke_fill=(40, 44, 52))
     return np.asarray(image)
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from trainers.data.environments import make_env
+from trainers.data.environments import base_env, make_env
 from trainers.pipeline.config import JobConfig
 from trainers.policies.checkpoint import checked_device
 from trainers.policies.multi_head import MultiHeadPolicy
@@ -25,7 +25,7 @@ def new_policy(config: JobConfig, env_kwargs: Mapping[str, Any], pooled: bool = 
     policy = MultiHeadPolicy(
         env.observation_space,
         env.action_space,
-        contract=env.unwrapped.contract,
+        contract=base_env(env).contract,
         width=config.width,
         pooled=pooled,
         normalization=config.normalization,

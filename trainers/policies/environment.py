@@ -9,7 +9,7 @@ import gymnasium
 from go1_mtl_gym.contract import PolicyContract
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import one_of
-from trainers.data.environments import make_env
+from trainers.data.environments import base_env, make_env
 from trainers.utils.files import json_form
 
 
@@ -31,9 +31,17 @@ class ForEnvironment:
         Raises:
             InvalidInputError: if the policy has no contract that names them.
         """
+        return self.named_contract().tasks
+
+    def named_contract(self) -> PolicyContract:
+        """The contract, for whatever needs one: it names the tasks.
+
+        Raises:
+            InvalidInputError: if the policy has none.
+        """
         if self.contract is None:
             raise InvalidInputError("a policy with a contract was expected: without one its tasks have no names")
-        return self.contract.tasks
+        return self.contract
 
     @property
     def env_kwargs(self) -> dict[str, Any]:
@@ -55,7 +63,7 @@ class ForEnvironment:
             one_of(task, self.tasks, "task")
         env = make_env(task, None, **{**self.env_kwargs, **env_kwargs})
         if self.contract is not None:
-            self.contract.check(env.unwrapped.contract, "the policy", "the environment")
+            self.contract.check(base_env(env).contract, "the policy", "the environment")
         return env
 
 

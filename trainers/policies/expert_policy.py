@@ -24,7 +24,7 @@ class ExpertPolicy(BasePolicy):
         super().__init__(venv.observation_space, venv.action_space)
         self._venv = venv
 
-    def predict(
+    def predict(  # type: ignore[override]  # flat spaces: never a dict
         self,
         observation: np.ndarray,
         state: Any = None,
@@ -42,5 +42,7 @@ class ExpertPolicy(BasePolicy):
             )
         return np.stack(self._venv.env_method("expert_action")).astype(np.float32), state
 
-    def _predict(self, observation: torch.Tensor, deterministic: bool = True) -> torch.Tensor:
+    def _predict(  # type: ignore[override]  # flat spaces: never a dict
+        self, observation: torch.Tensor, deterministic: bool = True
+    ) -> torch.Tensor:
         return torch.as_tensor(self.predict(observation.cpu().numpy())[0], device=observation.device)

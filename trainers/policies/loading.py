@@ -8,7 +8,9 @@ from trainers.policies.checkpoint import CheckpointError, checked_device, read_c
 from trainers.policies.multi_head import MultiHeadPolicy
 from trainers.policies.phase_free import PhaseFreePolicy
 
-KINDS = {cls.kind: cls for cls in (MultiHeadPolicy, PhaseFreePolicy)}
+KINDS: dict[str, type[MultiHeadPolicy] | type[PhaseFreePolicy]] = {
+    cls.kind: cls for cls in (MultiHeadPolicy, PhaseFreePolicy)
+}
 
 
 def load(path: str | PathLike[str], device: torch.device | str = "cpu") -> MultiHeadPolicy | PhaseFreePolicy:

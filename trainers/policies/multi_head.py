@@ -73,6 +73,9 @@ class MultiHeadPolicy(SavedPolicy, ForEnvironment, ActorCriticPolicy):
 
     kind = "multi_head"
     weight_files = ("weights",)
+    observation_space: spaces.Box
+    action_space: spaces.Box
+    action_dist: DiagGaussianDistribution
 
     def __init__(
         self,
@@ -94,8 +97,7 @@ class MultiHeadPolicy(SavedPolicy, ForEnvironment, ActorCriticPolicy):
         critic_lr_factor: float = 1.0,
         use_sde: bool = False,
     ) -> None:
-        if contract is not None and n_tasks is None:
-            n_tasks = contract.n_tasks
+        n_tasks = _number_of_tasks(contract, n_tasks)
         _check_arguments(observation_space, action_space, width, n_tasks, normalization, clip_sd, use_sde)
         if contract is not None:
             _check_spaces(contract, observation_space, action_space, n_tasks)
@@ -128,11 +130,13 @@ class MultiHeadPolicy(SavedPolicy, ForEnvironment, ActorCriticPolicy):
         self.obs_normalizer = norm.Normalizer(n_inputs)
         self.act_normalizer = norm.Normalizer(n_actions)
         self.log_std = nn.Parameter(torch.full((n_actions,), float(self.log_std_init)))
-        groups = [
+        groups: list[dict[str, Any]] = [
             {"params": [*self.actor.parameters(), self.log_std]},
             {"params": list(self.critic.parameters()), "lr_factor": self.critic_lr_factor},
         ]
-        self.optimizer = self.optimizer_class(groups, lr=lr_schedule(1), **self.optimizer_kwargs)
+        self.optimizer = self.optimizer_class(  # type: ignore[call-arg]  # torch's base class alone knows no rate
+            groups, lr=lr_schedule(1), **self.optimizer_kwargs
+        )
 
     def network_kwargs(self) -> dict[str, Any]:
         """Constructor arguments that shape the network: also ``policy_kwargs`` for a PPO that starts from it."""
@@ -219,9 +223,9 @@ class MultiHeadPolicy(SavedPolicy, ForEnvironment, ActorCriticPolicy):
         """An untrained policy like this one with one more task."""
         space = self.observation_space
         tasks = (*self.tasks, name)
-        arguments = self._get_constructor_parameters() | {
+        arguments: dict[str, Any] = self._get_constructor_parameters() | {
             "observation_space": spaces.Box(np.append(space.low, np.float32(0)), np.append(space.high, np.float32(1))),
-            "contract": self.contract.with_tasks(tasks, {name: TASKS[name].gait}),
+            "contract": self.named_contract().with_tasks(tasks, {name: TASKS[name].gait}),
             "n_tasks": len(tasks),
             "seed": seed,
         }
@@ -268,7 +272,7 @@ class MultiHeadPolicy(SavedPolicy, ForEnvironment, ActorCriticPolicy):
         actions = distribution.get_actions(deterministic=deterministic)
         return actions, self._values(normalized, obs), distribution.log_prob(actions)
 
-    def evaluate_actions(
+    def evaluate_actions(  # type: ignore[override]  # flat spaces: never a dict
         self, obs: torch.Tensor, actions: torch.Tensor
     ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor | None]:
         """Values (n, 1), log probabilities (n,) and entropies (n,) of given actions."""
@@ -276,11 +280,15 @@ class MultiHeadPolicy(SavedPolicy, ForEnvironment, ActorCriticPolicy):
         distribution = self._gaussian(self._means(normalized, obs))
         return self._values(normalized, obs), distribution.log_prob(actions), distribution.entropy()
 
-    def get_distribution(self, obs: torch.Tensor) -> DiagGaussianDistribution:
+    def get_distribution(  # type: ignore[override]  # flat spaces: never a dict
+        self, obs: torch.Tensor
+    ) -> DiagGaussianDistribution:
         """Distribution of the actions."""
         return self._gaussian(self.mean_actions(obs))
 
-    def predict_values(self, obs: torch.Tensor) -> torch.Tensor:
+    def predict_values(  # type: ignore[override]  # flat spaces: never a dict
+        self, obs: torch.Tensor
+    ) -> torch.Tensor:
         """Values, shape (n, 1)."""
         return self._values(self.normalized(obs), obs)
 
@@ -289,11 +297,13 @@ class MultiHeadPolicy(SavedPolicy, ForEnvironment, ActorCriticPolicy):
         if mode != self.training:
             super().set_training_mode(mode)
 
-    def _predict(self, observation: torch.Tensor, deterministic: bool = False) -> torch.Tensor:
+    def _predict(  # type: ignore[override]  # flat spaces: never a dict
+        self, observation: torch.Tensor, deterministic: bool = False
+    ) -> torch.Tensor:
         means = self.mean_actions(observation)
         return means if deterministic else self._gaussian(means).get_actions()
 
-    def predict(
+    def predict(  # type: ignore[override]  # flat spaces: never a dict
         self,
         observation: np.ndarray,
         state: tuple[np.ndarray, ...] | None = None,
@@ -363,6 +373,17 @@ class MultiHeadPolicy(SavedPolicy, ForEnvironment, ActorCriticPolicy):
         return policy
 
 
+def _number_of_tasks(contract: PolicyContract | None, n_tasks: int | None) -> int:
+    if n_tasks is not None:
+        return n_tasks
+    if contract is None:
+        raise InvalidInputError(
+            "a contract (or, for an environment without one, n_tasks) must be given, got neither; with PPO: "
+            "policy_kwargs={'contract': env.unwrapped.contract}"
+        )
+    return contract.n_tasks
+
+
 def _check_spaces(contract: PolicyContract, observation_space: Any, action_space: Any, n_tasks: int) -> None:
     sizes = (observation_space.shape, action_space.shape, n_tasks)
     expected = ((contract.observation_size,), (len(contract.joints),), contract.n_tasks)
@@ -377,16 +398,11 @@ def _check_arguments(
     observation_space: Any,
     action_space: Any,
     width: int,
-    n_tasks: int | None,
+    n_tasks: int,
     normalization: str,
     clip_sd: float,
     sde: bool,
 ) -> None:
-    if n_tasks is None:
-        raise InvalidInputError(
-            "a contract (or, for an environment without one, n_tasks) must be given, got neither; with PPO: "
-            "policy_kwargs={'contract': env.unwrapped.contract}"
-        )
     if isinstance(n_tasks, bool) or not isinstance(n_tasks, (int, np.integer)) or n_tasks < 1:
         raise InvalidInputError(f"n_tasks must be a positive integer, got {n_tasks!r}")
     if not isinstance(width, (int, np.integer)) or width < 1:

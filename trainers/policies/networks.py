@@ -9,6 +9,8 @@ from torch import nn
 
 OUTPUT_GAIN = 0.01
 """Initial output weights are this much smaller than torch's: an untrained policy stays near the mean action."""
+Heads = Sequence[nn.Module] | nn.ModuleList
+"""Modules by their index; torch does not call its list of them a sequence."""
 
 
 class MultiHeadActor(nn.Module):
@@ -25,14 +27,8 @@ class MultiHeadActor(nn.Module):
 
     def __init__(self, n_inputs: int, n_outputs: int, n_heads: int, width: int) -> None:
         super().__init__()
-        self.trunk = nn.Sequential(nn.Linear(n_inputs, width), nn.ELU(), nn.Linear(width, width), nn.ELU())
-        self.heads = nn.ModuleList(
-            nn.Sequential(nn.Linear(width, width), nn.ELU(), nn.Linear(width, n_outputs)) for _ in range(n_heads)
-        )
-        with torch.no_grad():
-            for head in self.heads:
-                head[-1].weight.mul_(OUTPUT_GAIN)
-                head[-1].bias.zero_()
+        self.trunk: nn.Module = nn.Sequential(nn.Linear(n_inputs, width), nn.ELU(), nn.Linear(width, width), nn.ELU())
+        self.heads = nn.ModuleList(_head(width, n_outputs) for _ in range(n_heads))
 
     def forward(self, x: torch.Tensor, head: torch.Tensor) -> torch.Tensor:
         """Outputs of shape (n, n_outputs) for inputs of shape (n, n_inputs) and head indices of shape (n,)."""
@@ -49,7 +45,15 @@ class MultiHeadActor(nn.Module):
         return self.heads[0](features) if len(self.heads) == 1 else _by_group(self.heads, features, rows)
 
 
-def route(heads: Sequence[nn.Module], features: torch.Tensor, head: torch.Tensor) -> torch.Tensor:
+def _head(width: int, n_outputs: int) -> nn.Sequential:
+    hidden, output = nn.Linear(width, width), nn.Linear(width, n_outputs)
+    with torch.no_grad():
+        output.weight.mul_(OUTPUT_GAIN)
+        output.bias.zero_()
+    return nn.Sequential(hidden, nn.ELU(), output)
+
+
+def route(heads: Heads, features: torch.Tensor, head: torch.Tensor) -> torch.Tensor:
     """Apply to each row the head it names.
 
     Rows are grouped by head, so each head computes its own rows only and receives gradients from these alone. Rows that
@@ -78,7 +82,7 @@ def route(heads: Sequence[nn.Module], features: torch.Tensor, head: torch.Tensor
     return _by_group(heads, features[order], counts)[back]
 
 
-def _by_group(heads: Sequence[nn.Module], features: torch.Tensor, counts: Sequence[int]) -> torch.Tensor:
+def _by_group(heads: Heads, features: torch.Tensor, counts: Sequence[int]) -> torch.Tensor:
     groups = zip(heads, features.split(list(counts)))
     return torch.cat([head(rows) for head, rows in groups if len(rows)])
 

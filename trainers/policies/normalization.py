@@ -72,7 +72,7 @@ def fit(data: np.ndarray, mode: str, binary: np.ndarray | None = None) -> tuple[
     else:
         return np.zeros(data.shape[1]), np.ones(data.shape[1])
     if binary is None:
-        binary = np.isin(data, (0.0, 1.0)).all(0)
+        binary = np.asarray(np.isin(data, (0.0, 1.0)).all(0))
     return np.where(binary, 0.0, shift), np.where(binary | (scale < SMALLEST_SCALE), 1.0, scale)
 
 

@@ -91,7 +91,8 @@ def phase_distance(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Absolute difference of phases [cycles], at most 0.5, shape (n,).
 
     Args:
-        first, second: (sine, cosine) of each, shape (n, 2).
+        first: (sine, cosine) of each, shape (n, 2).
+        second: likewise.
     """
     (sin, cos), (other_sin, other_cos) = first.T, second.T
     turn = np.arctan2(sin * other_cos - cos * other_sin, cos * other_cos + sin * other_sin)

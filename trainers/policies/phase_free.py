@@ -61,18 +61,19 @@ class PhaseFreePolicy(SavedPolicy, ForEnvironment, BasePolicy):
         self.estimator = estimator
         self.correction = float(correction)
         self.n_tasks = layout.n_tasks
-        self.contract = student.contract.with_terms(terms_of(layout))
+        contract = student.named_contract().with_terms(terms_of(layout))
+        self.contract = contract
         self.extra_env_kwargs = student.extra_env_kwargs
-        gaits = self.contract.gaits
+        gaits = contract.gaits
         if not gaits:
             raise InvalidInputError("a student whose contract names the gaits of its tasks was expected")
-        self._turn = np.array([1.0 / (gait.period * self.contract.control_hz) for gait in gaits])
+        self._turn = np.array([1.0 / (gait.period * contract.control_hz) for gait in gaits])
         self._can_stand = np.array([gait.can_stand for gait in gaits])
         self._command = layout.slices["command"]
         self._columns = layout.columns(phase_free_layout(student, 1))
         self._phase = clocked.slices["phase"].start
 
-    def predict(
+    def predict(  # type: ignore[override]  # flat spaces: never a dict
         self,
         observation: np.ndarray,
         state: tuple[np.ndarray, ...] | None = None,
@@ -120,7 +121,9 @@ class PhaseFreePolicy(SavedPolicy, ForEnvironment, BasePolicy):
         before, after = np.split(rows[:, self._columns], [self._phase], axis=1)
         return np.concatenate([before, clock, after], axis=1)
 
-    def _predict(self, observation: torch.Tensor, deterministic: bool = False) -> torch.Tensor:
+    def _predict(  # type: ignore[override]  # flat spaces: never a dict
+        self, observation: torch.Tensor, deterministic: bool = False
+    ) -> torch.Tensor:
         actions, _ = self.predict(observation.cpu().numpy(), deterministic=deterministic)
         return torch.as_tensor(actions, device=self.device)
 

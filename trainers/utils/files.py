@@ -15,7 +15,7 @@ import numpy as np
 from go1_mtl_gym.errors import InvalidInputError
 
 
-def write_atomically(path: str | os.PathLike[str], write: Callable[[BinaryIO], None]) -> None:
+def write_atomically(path: str | os.PathLike[str], write: Callable[[BinaryIO], object]) -> None:
     """Let `write` fill a temporary file beside `path`, then rename it over `path`.
 
     A crash at any point leaves the old file, or none, never half of the new one. Missing folders are made.

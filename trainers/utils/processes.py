@@ -11,7 +11,7 @@ from joblib.externals.loky.backend import resource_tracker as loky_resource_trac
 
 @contextlib.contextmanager
 def keep_interrupts() -> Iterator[None]:
-    """Processes that are begun in this block never see Ctrl-C; this one sees it at the end of the block at the latest.
+    """Processes that are begun in this block never see Ctrl-C; this one sees it when the block is over.
 
     The terminal sends SIGINT to every process of a program at once, and each worker would die with a traceback of its
     own. The mask of blocked signals is inherited, so that workers are safe from their first instruction on. Whoever
@@ -22,8 +22,13 @@ def keep_interrupts() -> Iterator[None]:
         return
     for tracker in (resource_tracker, loky_resource_tracker):
         tracker.ensure_running()  # starting it unblocks SIGINT on Python up to 3.11, so it must be there before
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    came: list[int] = []  # the mask is this thread's alone; another one may still receive the signal
+    handler = signal.signal(signal.SIGINT, lambda number, _: came.append(number))
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        signal.signal(signal.SIGINT, signal.SIG_DFL if handler is None else handler)
+        if came:
+            signal.raise_signal(signal.SIGINT)

@@ -1,14 +1,12 @@
-"""The quadratic program as data, its solutions certified, and a solver that forgets."""
+"""Solutions of the quadratic program: what they obey, and a solver that forgets."""
 
 import numpy as np
 import pytest
 
-from experts.mpc.config import NU, NX, MPCConfig
-from experts.mpc.controller import MPC, Solution
-from experts.mpc.program import QuadraticProgram
+from experts.mpc.config import MPCConfig
+from experts.mpc.controller import MPC
 from experts.mpc.srbd import FORCE_UNIT, linearize
 from go1_mtl_gym import robot
-from go1_mtl_gym.errors import InvalidInputError
 
 N = MPCConfig().steps
 WEIGHT_N = robot.MASS * robot.GRAVITY
@@ -17,16 +15,6 @@ WEIGHT_N = robot.MASS * robot.GRAVITY
 @pytest.fixture(scope="module")
 def mpc() -> MPC:
     return MPC()
-
-
-def program_of(problem: tuple) -> QuadraticProgram:
-    program = QuadraticProgram(MPCConfig())
-    program.update(*problem)
-    return program
-
-
-def flat(solution: Solution) -> np.ndarray:
-    return np.concatenate([solution.states.ravel(), solution.inputs.ravel()])
 
 
 def level(height=0.28) -> tuple:
@@ -38,36 +26,6 @@ def level(height=0.28) -> tuple:
     feet = np.tile(robot.NOMINAL_FOOT_B + [0, 0, 0.023], (N, 1, 1))
     model = linearize(np.tile(x, (N + 1, 1)), u_ref.reshape(N, 12), feet, np.diag([0.127, 0.394, 0.423]), 0.025)
     return model, x, np.tile(x, (N, 1)), u_ref.reshape(N, 12), np.ones((N, 4))
-
-
-def test_the_program_is_the_one_in_the_docstring(driven):
-    """Objective and constraints, from the problem's arrays, at a random point."""
-    rng, config = np.random.default_rng(0), MPCConfig()
-    model, x0, x_ref, u_ref, contact = driven.problems[-1]
-    program = program_of(driven.problems[-1])
-    x, u = x_ref + 0.1 * rng.normal(size=(N, NX)), u_ref + 0.1 * rng.normal(size=(N, NU))
-    u.reshape(N, 4, 3)[contact == 0] = 0.0
-    z = np.concatenate([x.ravel(), u.ravel()])
-
-    def cost(x, u):
-        return (np.square(x - x_ref) @ config.state_weight).sum() / 2 + 0.4 * np.square(u - u_ref).sum() / 2
-
-    ours = z @ (program.P @ z) / 2 + program.q @ z
-    assert ours + cost(0 * x, 0 * u) == pytest.approx(cost(x, u), rel=1e-9)
-    before = np.vstack([x0, x[:-1]])
-    gap = x - np.einsum("kij,kj->ki", model.A, before) - np.einsum("kij,kj->ki", model.B, u) - model.c
-    rows = program.A @ z
-    np.testing.assert_allclose((rows - program.l)[: N * NX], gap.ravel(), atol=1e-9)
-    np.testing.assert_array_equal(program.l[: N * NX], program.u[: N * NX])
-    f = u.reshape(N, 4, 3)
-    pyramid = np.stack([0.5 * f[..., 2] + sign * f[..., axis] for axis in (0, 1) for sign in (1, -1)], axis=-1)
-    ground = rows[N * NX :].reshape(N, 4, 5)
-    np.testing.assert_allclose(ground[..., :4], pyramid, atol=1e-12)
-    np.testing.assert_array_equal(ground[..., 4], f[..., 2])
-    low, high = program.l[N * NX :].reshape(N, 4, 5), program.u[N * NX :].reshape(N, 4, 5)
-    assert (low[..., :4] == 0).all() and np.isinf(high[..., :4]).all()
-    np.testing.assert_allclose(high[..., 4] * FORCE_UNIT, 160 * contact)
-    np.testing.assert_allclose(low[..., 4] * FORCE_UNIT, np.where(contact > 1 - 1e-9, 15.0, 0.0))
 
 
 def test_solutions_obey_dynamics_friction_and_schedule(mpc, driven):
@@ -165,36 +123,3 @@ def test_a_solver_cut_short_says_so(trotting):
     assert not solution.solved and solution.iterations == 10
     patient = MPC(MPCConfig(max_iterations=30, tolerance=1e-9)).solve(*trotting.problems[0])
     assert not patient.solved and patient.usable, "close enough to use"
-
-
-def test_sparsity_pattern_does_not_depend_on_the_problem(driven):
-    program = QuadraticProgram(MPCConfig())
-    indices, pointers = program.A.indices.copy(), program.A.indptr.copy()
-    for problem in driven.problems:
-        program.update(*problem)
-    np.testing.assert_array_equal(program.A.indices, indices)
-    np.testing.assert_array_equal(program.A.indptr, pointers)
-    assert program.A.shape == (N * (NX + 20), N * (NX + NU))
-    dense, (model, *_, contact) = program.A.toarray(), driven.problems[-1]
-    for k in range(1, N):
-        rows = slice(12 * k, 12 * k + 12)
-        np.testing.assert_array_equal(dense[rows, 12 * k - 12 : 12 * k], -model.A[k])
-        felt = np.repeat(contact[k] > 0, 3)  # columns of feet in the air do not matter
-        block = dense[rows, N * 12 + 12 * k : N * 12 + 12 * k + 12]
-        np.testing.assert_array_equal(block[:, felt], -model.B[k][:, felt])
-
-
-@pytest.mark.parametrize(
-    ("setting", "words"),
-    [
-        ({"steps": 3}, "steps"), ({"input_weight": 0.0}, "input_weight"), ({"friction": -0.5}, "friction"),
-        ({"max_force": float("nan")}, "max_force"), ({"min_force": -1.0}, "min_force"), ({"rho": 0.0}, "rho"),
-        ({"tolerance": 1.0}, "tolerance"), ({"max_iterations": 1}, "max_iterations"),
-        ({"relaxation": 2.0}, "relaxation"), ({"solver": "gurobi"}, "solver"),
-        ({"state_weight": (1.0,) * 11}, "number of state weights.*11"),
-        ({"state_weight": (-1.0,) + (1.0,) * 11}, "smallest state weight.*-1"),
-    ],
-)  # fmt: skip
-def test_impossible_settings_are_refused(setting, words):
-    with pytest.raises(InvalidInputError, match=words):
-        MPCConfig(**setting)

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from experts.mpc.frame import WORLD, Frame
 from experts.mpc.srbd import FORCE_UNIT
-from experts.mpc.warm_start import WORLD, Frame, Recall, Trajectory
+from experts.mpc.warm_start import Recall, Trajectory
 from go1_mtl_gym import GAITS
 
 TROT, DT = GAITS["trot"], 0.025
@@ -80,16 +81,6 @@ def test_a_plan_is_held_for_a_period(standing):
     recall.store(plan)
     for time_s, held in ((1.0, True), (1.01, True), (1.019, True), (1.02, False), (1.5, False), (0.99, False)):
         assert (recall.at(at(standing, time_s), 0.02) is plan) == held, time_s
-
-
-def test_a_frame_turns_there_and_back():
-    here, there = Frame(np.array([3.0, -2.0, 0.3]), 3.0), Frame(np.array([-1.0, 4.0, 0.2]), -3.0)
-    states = np.random.default_rng(0).normal(size=(5, 12))
-    np.testing.assert_allclose(here.states(there.states(states, here), there), states, atol=1e-12)
-    moved = there.states(states, here)
-    np.testing.assert_allclose(moved[:, 2] - states[:, 2], 6.0 - 2 * np.pi, atol=1e-12)
-    world = states[:, 3:6] @ here.rotation.T + here.origin_w
-    np.testing.assert_allclose(there.points(world), moved[:, 3:6], atol=1e-12)
 
 
 def test_a_trajectory_seen_from_elsewhere_is_the_same_in_the_world():

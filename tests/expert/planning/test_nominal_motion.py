@@ -81,6 +81,14 @@ def test_interpolation_passes_through_the_samples(gait):
 
 
 @EVERY
+def test_sway_at_one_phase_is_the_interpolated_velocity(gait):
+    nominal = motion(gait)
+    for phase in np.random.default_rng(1).uniform(-1, 2, 20):
+        x, y = nominal.at(np.array([phase]))[0, 9:11]
+        assert nominal.sway_velocity(phase) == complex(x, y)
+
+
+@EVERY
 def test_sway_is_limited_and_shared_like_the_load(gait):
     force = motion(gait).force
     assert (np.abs(force[..., :2]) <= SWAY * force[..., 2:] + 1e-12).all()

@@ -1,0 +1,96 @@
+"""Settings of the main job: what is normalized, what is refused, and what the command line makes of it."""
+
+import json
+
+import numpy as np
+import pytest
+
+from go1_mtl_gym import InvalidInputError
+from trainers import JobConfig
+from trainers.pipeline.command_line import parse_job
+from trainers.pipeline.demonstrations import held_out_jobs, training_jobs
+
+REFUSED = {
+    "rounds": (-1, 1.5, True, "3", None),
+    "seed": (-1, np.float64(2.0)),
+    "n_envs": (0,),
+    "threads": (0,),
+    "clean_s": (-1.0, float("nan"), np.inf, "60", None),
+    "shard_s": (0.0,),
+    "dagger_s": (0,),
+    "takeover_rad": (0.0,),
+    "randomized": (1.2,),
+    "corner_fraction": (-0.1, 2),
+    "task_interval": ((3.0, 1.0), 4.0),
+    "tasks": ((), "trot", ("trot", "trot"), ("fly",)),
+    "channels": ("phase", ("colour",)),
+    "normalization": ("max",),
+    "device": ("tpu",),
+    "held_out_s": (1.0,),
+    "episodes": (0,),
+    "video_s": (0.0,),
+}
+
+
+def test_numbers_of_numpy_become_pythons_and_can_be_written():
+    config = JobConfig(seed=np.int64(3), rounds=np.uint8(2), clean_s=np.float32(30.0), kp=20, tasks=["walk", "trot"])
+    assert type(config.seed) is int and type(config.rounds) is int
+    assert type(config.clean_s) is float and type(config.kp) is float
+    assert config.tasks == ("walk", "trot")
+    written = json.loads(json.dumps(config.as_dict()))
+    assert written["seed"] == 3 and written["clean_s"] == 30.0 and written["tasks"] == ["walk", "trot"]
+    assert JobConfig(**written) == config
+
+
+@pytest.mark.parametrize(("name", "value"), [(name, value) for name, values in REFUSED.items() for value in values])
+def test_what_cannot_be_is_refused_at_once_in_a_sentence_about_it(name, value):
+    with pytest.raises(InvalidInputError) as refusal:
+        JobConfig(**{name: value})
+    message = str(refusal.value)
+    assert name.rstrip("s") in message and "JobConfig(" not in message and len(message) < 250
+
+
+def test_a_preset_is_a_start_that_options_change():
+    config = JobConfig.from_preset("smoke", seed=4, rounds=0)
+    assert (config.preset, config.width, config.seed, config.rounds) == ("smoke", 64, 4, 0)
+    assert config.with_options(width=32).width == 32 and config.width == 64
+    with pytest.raises(InvalidInputError, match="'widht'"):
+        config.with_options(widht=3)
+    with pytest.raises(InvalidInputError, match="'smok'"):
+        JobConfig.from_preset("smok")
+
+
+def test_the_command_line_gives_the_same():
+    words = (
+        "--preset smoke --tasks walk trot --seed 4 --n-envs 1 --channels command --history 2 --control-hz 100 --out x"
+    )
+    config, out = parse_job(words.split())
+    options = {"tasks": ("walk", "trot"), "seed": 4, "n_envs": 1, "channels": ("command",), "history": 2}
+    assert config == JobConfig.from_preset("smoke", **options, control_hz=100)
+    assert out == "x"
+    config, out = parse_job(["--preset", "paper"])
+    assert (config.rounds, config.channels, config.control_hz, out) == (0, (), 1000, None)
+
+
+def test_every_shard_has_a_seed_of_its_own_and_shorter_runs_are_the_beginning_of_longer_ones():
+    config = JobConfig(clean_s=30.0, perturbed_s=45.0, held_out_s=15.0, tasks=("trot", "walk"), seed=2)
+    train, held_out = training_jobs(config), held_out_jobs(config)
+    assert len(train) == 2 * (2 + 3) and len(held_out) == 2
+    assert len({(job.task, job.seed) for job in train + held_out}) == 12
+    assert [job.perturbation is None for job in train] == [True] * 4 + [False] * 6
+    assert all(job.perturbation is None for job in held_out)
+    assert training_jobs(config.with_options(clean_s=15.0, perturbed_s=0.0)) == train[:2]
+    others = training_jobs(config.with_options(seed=3))
+    assert not {job.seed for job in train + held_out} & {job.seed for job in others}
+
+
+def test_what_follows_for_the_stages():
+    config = JobConfig(clone_steps=600, round_steps=100, rounds=3, batch_size=64, seed=5)
+    assert config.bc.steps == 600 and config.round_bc.steps == 100 and config.baseline_bc.steps == 600 + 3 * 100
+    assert {config.bc.seed, config.dagger.seed, config.phase.seed} == {5}
+    assert config.has_clock and not config.is_literal
+    assert not config.with_options(history=2).has_clock
+    assert config.with_options(channels=()).is_literal
+    assert config.perturbation(0.05).task_interval == (2.0, 6.0)
+    assert config.with_options(tasks=("trot",)).perturbation(0.05).task_interval is None, "one gait cannot change"
+    assert config.with_options(randomized=0).randomization_kwargs == {}
