@@ -11,7 +11,7 @@ import trainers
 from experiments import plots
 from experiments.agents import EXPERT, STUDENT, Agent, Expert, shipped, tasks_of, with_expert
 from experiments.results import Record, Results, distinct
-from experiments.stats import Group, group
+from experiments.stats import group
 from experiments.student.episodes import counts
 from experiments.study import Cell, Metrics, Study, option
 from experiments.tables import count, markdown
@@ -136,8 +136,3 @@ def _survival(ax: Axes, records: Sequence[Record]) -> None:
     ax.set_xticks([*levels], [f"{value:g}" for value in levels])
     ax.axhline(TARGET, color="0.7", linewidth=0.8, linestyle=":", zorder=0)
     plots.shares(ax)
-
-
-def _weakest(level: Group) -> float:
-    """Survival of the weakest gait."""
-    return min(own.rate("survived").value for own in group(level, "task").values())
