@@ -15,7 +15,7 @@ from experiments.stats import spread
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import number_in
 from trainers.algorithms.optimizer import torch_threads
-from trainers.pipeline.new_policy import check_device
+from trainers.policies.checkpoint import checked_device
 
 N_TASKS = 4
 """Of the made-up demonstrations, unless the number of heads is what varies."""
@@ -64,7 +64,7 @@ class TrainingOptions:
     collect_s: float = 4.0
 
     def __post_init__(self) -> None:
-        check_device(self.device)
+        checked_device(self.device)
         for name in ("rounds", "batch_size", "steps", "learning_steps"):
             number_in(getattr(self, name), 1, 1e9, name)
         for name in ("widths", "threads", "heads"):
@@ -116,6 +116,7 @@ class Stopwatch:
         self.steps = 0
 
     def __call__(self) -> None:
+        """Count a step."""
         self.steps += 1
         if self.steps == WARM_UP:
             self._start = self._now()

@@ -17,7 +17,7 @@ from go1_mtl_gym.validation import finite_vector, number_in, one_of
 from trainers import BCConfig
 from trainers.data.collection import EPISODE_S
 from trainers.data.environments import derive_seed
-from trainers.pipeline.new_policy import check_device
+from trainers.policies.checkpoint import checked_device
 
 Command = tuple[float, float, float]
 """(vx [m/s], vy [m/s], yaw rate [rad/s])."""
@@ -166,7 +166,7 @@ class PaperOptions:
         one_of(self.precision, tuple(PRECISIONS), "precision")
         for kind in self.kinds:
             one_of(kind, tuple(KINDS), "kind of policy")
-        check_device(self.device)
+        checked_device(self.device)
         number_in(self.threads, 1, 1024, "threads")
         self.bc(0, 1.0)
 
