@@ -4,7 +4,11 @@ import inspect
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields
+from pathlib import Path
 
+from experiments.catalog import STUDIES, study_class
+from experiments.results import Results
+from experiments.study import summary_line
 from go1_mtl_gym import (
     TASKS,
     DomainRandomization,
@@ -35,7 +39,6 @@ CONTENT = {
     "task": "one-hot task id, in the order of `tasks`",
 }
 """What the parts of an observation hold."""
-
 SETTINGS = {
     "control_hz": "control rate [Hz]",
     "channels": "channels",
@@ -58,6 +61,8 @@ SETTINGS = {
 """Settings of the main job that its table shows, and what they are called there."""
 OF_ROUNDS = ("dagger_s", "round_steps")
 """Those that mean nothing without a DAgger round."""
+RESULTS = Path(__file__).resolve().parents[1] / "results"
+"""Where the results of the studies are."""
 
 
 def markdown(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
@@ -208,6 +213,19 @@ def _setting(config: JobConfig, name: str) -> str:
     )
 
 
+def studies() -> str:
+    """Every study: what it measures, and what it took when it was published."""
+    rows = []
+    for name in STUDIES:
+        path = RESULTS / f"{name}.json"
+        minutes, size = "-", "-"
+        if path.is_file():
+            measured = Results.read(path)
+            minutes, size = f"{measured.minutes:.0f}" if measured.seconds else "-", f"{path.stat().st_size / 1024:.0f}"
+        rows.append((f"`{name}`", summary_line(study_class(name)), minutes, size))
+    return markdown(("study", "measures", "one core [min]", "file [kB]"), rows)
+
+
 def described(owner: type) -> dict[str, str]:
     """What a class's Google docstring says of each name under "Args" or "Attributes", on one line."""
     text = inspect.cleandoc(owner.__doc__ or "")
@@ -234,6 +252,7 @@ TABLES: dict[str, Callable[[], str]] = {
         arguments,
         presets,
         job_options,
+        studies,
     )
 }
 """The tables that a page can ask for."""
