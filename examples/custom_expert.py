@@ -6,9 +6,9 @@ python examples/custom_expert.py
 import argparse
 from collections.abc import Sequence
 
-import gymnasium as gym
 import numpy as np
 
+import trainers
 from go1_mtl_gym import RobotState
 from go1_mtl_gym.actuation import PDGains
 from go1_mtl_gym.robot import HOME_POSE
@@ -39,19 +39,16 @@ class NoddingExpert:
 
 @main
 def run(arguments: Sequence[str] | None = None) -> None:
-    """Let the expert drive."""
-    parser = argparse.ArgumentParser(description="Let an expert of your own drive.")
+    """Let the expert drive, and keep what it saw and did as rows to learn from."""
+    parser = argparse.ArgumentParser(description="Collect demonstrations of an expert of your own.")
     parser.add_argument("--seconds", type=float, default=3.0, help="of robot time (default: 3)")
     options = parser.parse_args(arguments)
 
-    env = gym.make("go1_mtl_gym:Go1Trot-v0", expert=NoddingExpert)
-    _, info = env.reset(seed=0, options={"command": (0.3, 0.0, 0.0)})
-    pitch = []
-    for _ in range(round(options.seconds * env.unwrapped.control_hz)):
-        *_, info = env.step(env.unwrapped.expert_action())
-        pitch.append(env.unwrapped.state.rpy[1])
-    env.close()
-    print(f"fallen {info['fallen']}, pitch from {min(pitch):.2f} to {max(pitch):.2f} rad")
+    rows = trainers.collect("trot", seconds=options.seconds, env_kwargs={"expert": NoddingExpert})
+    targets = rows.acts * rows.contract.action_scale + rows.contract.default_q
+    front_knee = targets[:, rows.contract.joints.index("FL_calf_joint")]
+    print(f"{len(rows)} rows in {rows.starts.sum()} episode,", end=" ")
+    print(f"front left knee from {front_knee.min():.2f} to {front_knee.max():.2f} rad")
 
 
 if __name__ == "__main__":

@@ -45,7 +45,8 @@ def summary(metrics: dict[str, Any], out: Path) -> str:
         "metrics.json": "everything measured",
         "gaits.gif": "the policy in every gait",
     }
-    there = [f"  {out / name}    {meaning}" for name, meaning in files.items() if (out / name).is_file()]
+    width = len(str(out / max(files, key=len)))
+    there = [f"  {str(out / name):{width}}  {files[name]}" for name in files if (out / name).is_file()]
     lines = [
         trainers.results_table(metrics),
         "\nresults:",

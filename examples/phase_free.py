@@ -15,8 +15,8 @@ def run(arguments: Sequence[str] | None = None) -> None:
     """Watch the policy walk with its clock, and put an estimate of the phase in the clock's place."""
     parser = argparse.ArgumentParser(description="Make a policy that needs no gait clock from one that does.")
     parser.add_argument("--policy", help="file of a policy with a clock (default: the one in the package)")
-    parser.add_argument("--seconds", type=float, default=20.0, help="of walking per gait (default: 20)")
-    parser.add_argument("--steps", type=int, default=500, help="of gradient descent (default: 500)")
+    parser.add_argument("--seconds", type=float, default=30.0, help="of walking per gait (default: 30)")
+    parser.add_argument("--steps", type=int, default=1000, help="of gradient descent (default: 1000)")
     parser.add_argument("--episodes", type=int, default=4, help="to measure it (default: 4)")
     parser.add_argument("--out", default="runs/phase_free.zip", help="file of the policy")
     options = parser.parse_args(arguments)

@@ -1,7 +1,8 @@
 """One style for all pictures: figures on an Agg canvas, colors, legends, and what several studies draw alike."""
 
+import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +12,13 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 
-from experiments.stats import Rate
+from experiments.stats import Group, Rate
 
 BLUE, RED, GREEN, PURPLE, YELLOW = "#2166ac", "#d6604d", "#1b9e77", "#7570b3", "#e6ab02"
 STUDENTS = (BLUE, GREEN, PURPLE, YELLOW)
 """Colors of the policies, in turn."""
+COLORS = (BLUE, RED, GREEN, PURPLE, YELLOW, "0.35")
+"""Of series, in turn."""
 EXPERT_STYLE = {"color": "0.35", "linestyle": "--"}
 DPI = 110
 
@@ -56,9 +59,59 @@ def agent_styles(names: Sequence[str], expert: str) -> dict[str, dict[str, Any]]
     return {name: solid.get(name, EXPERT_STYLE) for name in names}
 
 
+def dots(panels: Mapping[str, Mapping[str, Mapping[str, Rate | float | None]]], log: Sequence[str] = ()) -> Figure:
+    """A panel per metric, a row per label, a dot per series; shares with their 95 % intervals.
+
+    Args:
+        panels: metric -> series -> label of a row -> value; None leaves the place empty.
+        log: metrics with a logarithmic axis.
+    """
+    rows = list(dict.fromkeys(row for series in panels.values() for values in series.values() for row in values))
+    names = list(dict.fromkeys(name for series in panels.values() for name in series))
+    figure = new_figure(max(4.0, 2.0 * len(panels) + 1.8), 0.26 * len(rows) + 1.3)
+    axes = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
+    for ax, (metric, series) in zip(axes, panels.items()):
+        for name, values in series.items():
+            i = names.index(name)
+            for row, value in values.items():
+                _dot(ax, value, rows.index(row) + 0.18 * (i - (len(names) - 1) / 2), COLORS[i % len(COLORS)], name)
+        ax.set_xlabel(metric, fontsize=9)
+        ax.tick_params(labelsize=8)
+        ax.grid(axis="y", color="0.93")
+        if metric in log:
+            ax.set_xscale("log")
+        elif (shown := ax.get_xlim())[0] > 0 and shown[0] < 0.7 * shown[1]:
+            ax.set_xlim(left=0.0)
+    axes[0].set_yticks(range(len(rows)), rows)
+    axes[0].invert_yaxis()
+    if len(names) > 1:
+        legend(figure, axes)
+    return figure
+
+
+def _dot(ax: Axes, value: Rate | float | None, height: float, color: str, label: str) -> None:
+    if isinstance(value, Rate):
+        ax.plot(value.interval, [height] * 2, color=color, linewidth=1.0, alpha=0.6)
+        ax.set_xlim(-0.04, 1.04)
+        value = value.value
+    if value is not None:
+        ax.plot(value, height, "o", color=color, markersize=5, label=label)
+
+
 def band(ax: Axes, x: Sequence[float], rates: Sequence[Rate], color: Any, alpha: float) -> None:
     """The 95 % intervals of some shares."""
     ax.fill_between(x, *np.transpose([rate.interval for rate in rates]), color=color, alpha=alpha, linewidth=0)
+
+
+def survival_and_success(ax: Axes, levels: Mapping[float, Group], color: str, label: str) -> None:
+    """Survival (solid, with 95 % intervals) and success (dashed) over what the levels differ in."""
+    survival, success = ([own.rate(key) for own in levels.values()] for key in ("survived", "succeeded"))
+    band(ax, [*levels], survival, color, 0.12)
+    solid = {"color": color, "linewidth": 2.0, "marker": "o", "markersize": 3.5, "label": label}
+    ax.plot([*levels], [rate.value for rate in survival], **solid)
+    ax.plot([*levels], [rate.value for rate in success], color=color, linewidth=1.2, linestyle="--")
+    ax.set_ylabel("survival (solid), success (dashed)", fontsize=9)
+    shares(ax)
 
 
 def log_ticks(ax: Axes, values: Sequence[float], label: str) -> None:
@@ -74,8 +127,24 @@ def shares(ax: Axes) -> None:
     ax.set_ylim(-0.04, 1.04)
 
 
-def transition_matrix(ax: Axes, gaits: Sequence[str], rates: dict[tuple[str, str], Rate]) -> AxesImage:
-    """Successful changes of gait, one square per (from, to); returns the image."""
+def transition_figure(agents: Mapping[str, Mapping[tuple[str, str], Rate]], title: str) -> Figure:
+    """Changes of gait, one matrix per agent and one square per pair, from the row's gait to the column's.
+
+    Args:
+        agents: name -> (from, to) -> share.
+        title: what is counted.
+    """
+    gaits = list(dict.fromkeys(gait for pairs in agents.values() for gait in itertools.chain(*zip(*pairs))))
+    figure = new_figure((1.3 + 0.75 * len(gaits)) * len(agents) + 0.5, 1.4 + 0.62 * len(gaits))
+    axes = figure.subplots(1, len(agents), squeeze=False)[0]
+    for ax, (agent, pairs) in zip(axes, agents.items()):
+        image = _matrix(ax, gaits, pairs)
+        ax.set_title(f"{agent}: {title}", fontsize=10)
+    figure.colorbar(image, ax=axes, shrink=0.85, label="fraction")
+    return figure
+
+
+def _matrix(ax: Axes, gaits: Sequence[str], rates: Mapping[tuple[str, str], Rate]) -> AxesImage:
     values = np.full((len(gaits), len(gaits)), np.nan)
     for i, first in enumerate(gaits):
         for j, second in enumerate(gaits):

@@ -1,7 +1,6 @@
 """The Gymnasium environment of the Go1."""
 
 import copy
-from collections import deque
 from numbers import Integral
 from typing import Any
 
@@ -12,12 +11,11 @@ from gymnasium.error import ResetNeeded
 from gymnasium.spaces import Box
 from numpy.typing import ArrayLike
 
-from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PHYSICS_HZ, ActionMap
 from go1_mtl_gym.contract import PolicyContract
 from go1_mtl_gym.deprecation import renamed_attribute
 from go1_mtl_gym.env_config import RENDER_MODES, EnvConfig
-from go1_mtl_gym.episode import Episode, draw_conditions, how_it_ended
+from go1_mtl_gym.episode import Episode, begin_episode, how_it_ended
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.expert import Expert, make_expert
 from go1_mtl_gym.gaits import check_phase
@@ -28,9 +26,6 @@ from go1_mtl_gym.sim.physics_params import PhysicsParams
 from go1_mtl_gym.sim.simulation import Simulation
 from go1_mtl_gym.tasks import TASKS, Task, check_reset_options
 from go1_mtl_gym.validation import finite_vector, one_of
-
-RESET_JOINT_NOISE = 0.03
-"""Largest deviation of a joint from the home pose after a reset [rad]."""
 
 
 class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
@@ -150,21 +145,7 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
         """
         name, command = check_reset_options(options, self.tasks, self.config.task)
         super().reset(seed=int(seed) if isinstance(seed, Integral) else seed)
-        task = TASKS[name or str(self.np_random.choice(self.tasks))]
-        drawn = task.draw_command(self.np_random)
-        joint_noise = self.np_random.uniform(-RESET_JOINT_NOISE, RESET_JOINT_NOISE, 12)
-        conditions = draw_conditions(self.config, self.np_random)
-        if conditions.physics is not None:
-            self._simulation.set_physics_params(conditions.physics)
-        self._simulation.reset(robot.HOME_POSE + joint_noise)
-        self._episode = Episode(
-            task,
-            drawn if command is None else command,
-            last_action=self.action_map.from_radians(robot.HOME_POSE),
-            frames=deque(maxlen=self.layout.history),
-            sensor_noise=conditions.sensor_noise,
-            state_source=conditions.state_source,
-        )
+        self._episode = begin_episode(self.config, self._simulation, self.np_random, name, command)
         state = self.state
         observation = self._observe(self._episode, state)
         if self._expert is not None:

@@ -1,4 +1,4 @@
-"""One episode: how its conditions are drawn, what it carries from step to step, and when it is over."""
+"""One episode: how it begins, what it carries from step to step, and when it is over."""
 
 from collections import deque
 from collections.abc import Mapping
@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from go1_mtl_gym import robot
 from go1_mtl_gym.env_config import EnvConfig
 from go1_mtl_gym.gaits import next_phase, passes
 from go1_mtl_gym.rewards import reward_terms
@@ -15,54 +16,19 @@ from go1_mtl_gym.sensing.state import RobotState
 from go1_mtl_gym.sensing.state_estimator import StateEstimator
 from go1_mtl_gym.sensing.state_noise import EstimatorError
 from go1_mtl_gym.sensing.state_source import StateSource, TrueState
-from go1_mtl_gym.sim.physics_params import PhysicsParams
-from go1_mtl_gym.tasks import Task
+from go1_mtl_gym.sim.simulation import Simulation
+from go1_mtl_gym.tasks import TASKS, Task
 
 COMMAND_FILTER_S = 0.2
 """Time constant of the low-pass between a command and what expert and student see of it [s]."""
 COMMAND_SLEW = (4.0, 4.0, 8.0)
 """Largest change of the filtered command per second: vx, vy [m/s^2], yaw rate [rad/s^2]."""
+RESET_JOINT_NOISE = 0.03
+"""Largest deviation of a joint from the home pose after a reset [rad]."""
 FALLEN_HEIGHT = 0.14
 """A trunk lower than this has fallen [m]."""
 FALLEN_COSINE = 0.5
 """A trunk tilted by more than arccos of this has fallen."""
-
-
-# -- Its conditions ----------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class EpisodeConditions:
-    """What one episode takes place under.
-
-    Attributes:
-        physics: what is different about the physics; None leaves the simulation as it is.
-        sensor_noise: of the sensors, or None.
-        state_source: where the expert's state comes from.
-    """
-
-    physics: PhysicsParams | None
-    sensor_noise: SensorNoise | None
-    state_source: StateSource
-
-
-def draw_conditions(config: EnvConfig, rng: np.random.Generator) -> EpisodeConditions:
-    """Draw what the next episode takes place under.
-
-    Args:
-        config: the environment's.
-        rng: gives one number for the estimator noise and one for the randomization, whatever is drawn from them.
-    """
-    source: StateSource = TrueState()
-    if config.estimator_noise is not None:
-        source = EstimatorError(config.estimator_noise, int(rng.integers(2**63)))
-    if config.state_estimator is not None:
-        source = StateEstimator(config.state_estimator)
-    if config.randomization is None:
-        return EpisodeConditions(None, config.noise, source)
-    stream = np.random.default_rng(int(rng.integers(2**63)))
-    physics, factor = config.randomization.draw(stream, config.physics)
-    return EpisodeConditions(physics, config.noise if factor is None else config.scaled_noise(factor), source)
 
 
 # -- Its course --------------------------------------------------------------------------------------------------------
@@ -90,8 +56,8 @@ class Episode:
     Attributes:
         task: what is asked for.
         command: (vx [m/s], vy [m/s], yaw rate [rad/s]) as asked for, shape (3,).
-        last_action: the action applied during the last step, in [-1, 1], shape (12,).
         frames: the latest proprioceptive frames, newest first, each of shape (34,); its `maxlen` is their number.
+        last_action: the action applied during the last step, in [-1, 1], shape (12,); 0, a stand, before the first.
         sensor_noise: what is added to the sensors' readings, or None.
         state_source: where the expert's state comes from.
         filtered_command: what expert and student see of the command, shape (3,).
@@ -103,8 +69,8 @@ class Episode:
 
     task: Task
     command: np.ndarray
-    last_action: np.ndarray
     frames: deque[np.ndarray]
+    last_action: np.ndarray = field(default_factory=lambda: np.zeros(len(robot.JOINTS)))
     sensor_noise: SensorNoise | None = None
     state_source: StateSource = field(default_factory=TrueState)
     filtered_command: np.ndarray = field(default_factory=lambda: np.zeros(3))
@@ -208,6 +174,48 @@ class Episode:
             "fallen": ended in ("fall", "unstable"),
             "ended": ended,
         }
+
+
+# -- Its beginning -----------------------------------------------------------------------------------------------------
+
+
+def begin_episode(
+    config: EnvConfig,
+    simulation: Simulation,
+    rng: np.random.Generator,
+    task: str | None = None,
+    command: np.ndarray | None = None,
+) -> Episode:
+    """Stand the robot up, and begin an episode there.
+
+    Args:
+        config: the environment's.
+        simulation: is reset; gets its physics if there is a randomization, and keeps them otherwise.
+        rng: of everything that is drawn. It gives as many numbers whatever was asked for, one of them for the estimator
+            noise and one for the randomization, if there are any.
+        task: name of the task; None draws one.
+        command: (vx [m/s], vy [m/s], yaw rate [rad/s]), shape (3,); None takes the one that is drawn.
+    """
+    chosen = TASKS[task or str(rng.choice(config.tasks))]
+    drawn = chosen.draw_command(rng)
+    joint_noise = rng.uniform(-RESET_JOINT_NOISE, RESET_JOINT_NOISE, len(robot.JOINTS))
+    source, noise = _state_source(config, rng), config.noise
+    if config.randomization is not None:
+        stream = np.random.default_rng(int(rng.integers(2**63)))
+        physics, factor = config.randomization.draw(stream, config.physics)
+        simulation.set_physics_params(physics)
+        noise = noise if factor is None else config.scaled_noise(factor)
+    simulation.reset(robot.HOME_POSE + joint_noise)
+    command = drawn if command is None else command
+    return Episode(chosen, command, deque(maxlen=config.history), sensor_noise=noise, state_source=source)
+
+
+def _state_source(config: EnvConfig, rng: np.random.Generator) -> StateSource:
+    if config.estimator_noise is not None:
+        return EstimatorError(config.estimator_noise, int(rng.integers(2**63)))
+    if config.state_estimator is not None:
+        return StateEstimator(config.state_estimator)
+    return TrueState()
 
 
 # -- Its end -----------------------------------------------------------------------------------------------------------

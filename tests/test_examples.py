@@ -13,6 +13,8 @@ from types import ModuleType
 
 import pytest
 
+from go1_mtl_gym import PAPER_TASKS
+
 ROOT = Path(__file__).parent.parent
 SMOKE_TASKS = ("bound", "walk")
 """Half of the gaits, in half of the time."""
@@ -66,10 +68,11 @@ def test_a_custom_gait_walks(passing_tasks, capsys):
     assert "amble: fallen False" in capsys.readouterr().out
 
 
-def test_a_custom_expert_nods(capsys):
+def test_a_custom_expert_nods_without_falling(capsys):
     assert example("custom_expert").run(["--seconds", "2"]) == 0
-    low, high = map(float, re.search(r"fallen False, pitch from (\S+) to (\S+) rad", capsys.readouterr().out).groups())
-    assert low < -0.05 and high > 0.05
+    pattern = r"100 rows in 1 episode, front left knee from (\S+) to (\S+) rad\n"
+    low, high = map(float, re.fullmatch(pattern, capsys.readouterr().out).groups())
+    assert high - low == pytest.approx(2 * 0.24, abs=0.03)
 
 
 def test_a_new_gait_leaves_a_policy_that_quickstart_drives(tmp_path, capsys):
@@ -88,11 +91,18 @@ def test_a_policy_without_a_clock_is_made_and_saved(tmp_path, capsys):
     assert example("quickstart").run([str(out), "--seconds", "0.2"]) == 0
 
 
+def test_ppo_goes_on_from_the_policy(tmp_path, capsys):
+    out = tmp_path / "ppo.zip"
+    assert example("ppo").run(["--steps", "1", "--critic-steps", "40", "--episodes", "1", "--out", str(out)]) == 0
+    assert capsys.readouterr().out.count("success in 100 % of 1 episodes before") == len(PAPER_TASKS)
+    assert example("quickstart").run([str(out), "--seconds", "0.2"]) == 0
+
+
 # -- Errors ------------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
-    "name", ["quickstart", "dagger", "expert", "custom_gait", "custom_expert", "new_gait", "phase_free"]
+    "name", ["quickstart", "dagger", "expert", "custom_gait", "custom_expert", "new_gait", "phase_free", "ppo"]
 )
 def test_help_says_what_the_options_are(name, capsys):
     with pytest.raises(SystemExit) as end:

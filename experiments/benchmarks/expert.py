@@ -67,9 +67,9 @@ class ExpertBenchmark(Study):
     note = (
         "One process, one thread, one walk; at every state of it all answer in turn. daqp and piqp: our expert with "
         "these exact solvers in OSQP's place. "
-        "[go2-convex-mpc](https://github.com/elijah-waichong-chan/go2-convex-mpc): a convex MPC of the Unitree Go2 in Python, CasADi and OSQP with a horizon like ours, asked at our robot's "
-        "states with our gait; it answers with its own model, weights and tolerances, and its QP is timed by its own "
-        "clock."
+        "[go2-convex-mpc](https://github.com/elijah-waichong-chan/go2-convex-mpc): a convex MPC of the Unitree Go2 in "
+        "Python, CasADi and OSQP with a horizon like ours, asked at our robot's states with our gait; it answers with "
+        "its own model, weights and tolerances, and its QP is timed by its own clock."
     )
     full = ExpertOptions()
     quick = ExpertOptions(states=5)
@@ -169,7 +169,7 @@ def contestants(options: ExpertOptions) -> dict[str, Call]:
     """Who takes part; solvers that are not installed are named on standard error.
 
     Raises:
-        MissingPeer: if the checkout that was asked for cannot be used.
+        MissingPeerError: if the checkout that was asked for cannot be used.
     """
     calls: dict[str, Call] = {OURS: Ours(MPCConfig())}
     for name in EXACT:

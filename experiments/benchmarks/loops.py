@@ -11,9 +11,9 @@ from imitation.algorithms import bc as imitation_bc
 from imitation.data.types import Transitions
 from stable_baselines3.common.policies import ActorCriticPolicy
 
+from experiments.benchmarks.turns import RATE, WARM_UP, Stopwatch, TrainingOptions, Turn
 from go1_mtl_gym.contract import ObservationTerm, PolicyContract
 from go1_mtl_gym.sensing.observation import FRAME_SIZE
-from experiments.benchmarks.turns import RATE, WARM_UP, Stopwatch, TrainingOptions, Turn
 from trainers import BCConfig, BCTrainer, Demonstrations, MultiHeadPolicy, make_logger
 
 JOINTS = 12

@@ -13,7 +13,7 @@ from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.sensing.state import RobotState
 
 
-class MissingPeer(InvalidInputError):
+class MissingPeerError(InvalidInputError):
     """A checkout that was asked for cannot be used; the message says what is missing."""
 
 
@@ -30,7 +30,7 @@ class Go2ConvexMPC:
         command: (vx [m/s], vy [m/s], yaw rate [rad/s]).
 
     Raises:
-        MissingPeer: if the folder, a package or a mesh is missing.
+        MissingPeerError: if the folder, a package or a mesh is missing.
     """
 
     HEIGHT = 0.27
@@ -39,11 +39,13 @@ class Go2ConvexMPC:
     def __init__(self, checkout: Path, gait: Gait, command: Sequence[float]) -> None:
         source = checkout / "src" / "python"
         if not (source / "convex_mpc").is_dir():
-            raise MissingPeer(f"{checkout} is no checkout of go2-convex-mpc: there is no src/python/convex_mpc in it")
+            raise MissingPeerError(
+                f"{checkout} is no checkout of go2-convex-mpc: there is no src/python/convex_mpc in it"
+            )
         if gait.name != "trot":
-            raise MissingPeer(f"go2-convex-mpc knows trot only, got {gait.name}")
+            raise MissingPeerError(f"go2-convex-mpc knows trot only, got {gait.name}")
         if not hasattr(np, "trapz"):
-            raise MissingPeer(f"go2-convex-mpc does not run on numpy {np.__version__}; it needs numpy < 2.4")
+            raise MissingPeerError(f"go2-convex-mpc does not run on numpy {np.__version__}; it needs numpy < 2.4")
         sys.path.append(str(source))
         try:
             from convex_mpc.centroidal_mpc import CentroidalMPC
@@ -52,11 +54,13 @@ class Go2ConvexMPC:
             from convex_mpc.go2_robot_data import PinGo2Model
             from convex_mpc.leg_controller import LegController
         except ImportError as error:
-            raise MissingPeer(f"go2-convex-mpc cannot be imported: {error}; it needs casadi and pin") from error
+            raise MissingPeerError(f"go2-convex-mpc cannot be imported: {error}; it needs casadi and pin") from error
         try:
             self._robot = PinGo2Model()
         except ValueError as error:
-            raise MissingPeer(f"go2-convex-mpc cannot read its robot: {error}; is the checkout complete?") from error
+            raise MissingPeerError(
+                f"go2-convex-mpc cannot read its robot: {error}; is the checkout complete?"
+            ) from error
         self._ours, self._command = gait, command
         self._gait, self._legs = TheirGait(1.0 / gait.period, gait.duty), LegController()
         self._trajectory = ComTraj(self._robot)

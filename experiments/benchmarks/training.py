@@ -29,9 +29,9 @@ class TrainingBenchmark(Study):
     note = (
         "Everybody has a turn in every round, in one order and then in the other; ratios are taken within a round: "
         "their median and quartiles. Bare loop: the same network, loss, AdamW, clipping and one-cycle schedule in "
-        "twenty lines of PyTorch. imitation: its behavior cloning as it comes, on stable-baselines3's policy with three "
-        "hidden layers of the same width, and on our network. bfloat16 rounds what the network computes, weights and "
-        "loss stay float32; medium allows PyTorch to round inside of matrix products. Demonstrations are made up."
+        "twenty lines of PyTorch. imitation: its behavior cloning as it comes, on stable-baselines3's policy with "
+        "three hidden layers of the same width, and on our network. bfloat16 rounds what the network computes, weights "
+        "and loss stay float32; medium allows PyTorch to round inside of matrix products. Demonstrations are made up."
     )
     full = TrainingOptions()
     quick = TrainingOptions(

@@ -116,6 +116,7 @@ class Stopwatch:
         self.steps = 0
 
     def __call__(self) -> None:
+        """Count a step."""
         self.steps += 1
         if self.steps == WARM_UP:
             self._start = self._now()

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from experiments import plots
 from experiments.expert.lab import ExpertOptions, ExpertStudy, Lab, generator
 from experiments.pushing import CRUISE, DIRECTIONS, push_w
-from experiments.results import Results, distinct
+from experiments.results import Results
 from experiments.searches import climb_from, scouted
 from experiments.stats import group
 from experiments.tables import markdown, number
@@ -113,21 +113,15 @@ class Limits(ExpertStudy):
         return markdown(header, rows, text_columns=2)
 
     def figure(self, results: Results) -> Figure:
-        """A panel per axis, a bar per gait."""
+        """A panel per axis."""
         titles = {"vx": "forward [m/s]", "-vx": "backward [m/s]", "vy": "sideways [m/s]", "yaw": "yaw rate [rad/s]"}
-        axes_shown, gaits = group(results.records, "condition"), distinct(results.records, "task")
-        figure = plots.new_figure(3.0 * len(axes_shown) + 0.6, 0.36 * len(gaits) + 1.5)
-        axes = figure.subplots(1, len(axes_shown), sharey=True, squeeze=False)[0]
-        for ax, (axis, members) in zip(axes, axes_shown.items()):
-            rows = [gaits.index(own["task"]) for own in members]
-            ax.barh(rows, members.values("survived_to"), height=0.7, color="#a6c8e4", label="survived")
-            ax.barh(rows, members.values("tracked_to"), height=0.4, color=plots.BLUE, label="and tracked")
-            ax.set_title(titles[axis], fontsize=10)
-            ax.set_yticks(range(len(gaits)), gaits)
-            ax.set_xlim(left=0)
-        axes[0].invert_yaxis()
-        plots.legend(figure, axes)
-        return figure
+        series = {"survived": "survived_to", "and tracked": "tracked_to"}
+        return plots.dots(
+            {
+                titles[axis]: {name: {own["task"]: own[key] for own in members} for name, key in series.items()}
+                for axis, members in group(results.records, "condition").items()
+            }
+        )
 
 
 def episodes(lab: Lab, task: str, axis: str, level: float, trials: int, seconds: float, seed: int) -> Errors | None:
@@ -196,19 +190,10 @@ class Pushes(ExpertStudy):
         return markdown(["gait", *(f"{name} [m/s]" for name in DIRECTIONS)], rows)
 
     def figure(self, results: Results) -> Figure:
-        """A panel per gait, a bar per direction."""
-        gaits = group(results.records, "task")
-        figure = plots.new_figure(2.1 * len(gaits) + 1.2, 3.1)
-        axes = figure.subplots(1, len(gaits), sharey=True, squeeze=False)[0]
-        for ax, (gait, members) in zip(axes, gaits.items()):
-            names = distinct(members, "condition")
-            bars = ax.bar(range(len(names)), members.values("largest"), color=plots.BLUE, width=0.7)
-            ax.bar_label(bars, fmt="%.1f", fontsize=8, padding=1)
-            ax.set_xticks(range(len(names)), names, rotation=40, ha="right", fontsize=9)
-            ax.set_title(gait, fontsize=10)
-        axes[0].set_ylabel("largest push survived [m/s]")
-        axes[0].margins(y=0.15)
-        return figure
+        """A dot per direction."""
+        directions = group(results.records, "condition").items()
+        largest = {direction: {own["task"]: own["largest"] for own in members} for direction, members in directions}
+        return plots.dots({"largest push survived [m/s]": largest})
 
 
 def largest_push(lab: Lab, task: str, direction: str, options: PushOptions, seed: int) -> float:

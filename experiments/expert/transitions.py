@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from experiments import plots
 from experiments.expert.lab import ExpertOptions, ExpertStudy, Lab, generator, shared_range
-from experiments.results import Results, distinct
+from experiments.results import Results
 from experiments.stats import group
 from experiments.student.transitions import transition_rates
 from experiments.tables import count, markdown
@@ -62,14 +62,8 @@ class Transitions(ExpertStudy):
         return markdown(["from", "survived"], rows)
 
     def figure(self, results: Results) -> Figure:
-        """A square per pair, from the row's gait to the column's."""
-        gaits = distinct(results.records, "task")
-        figure = plots.new_figure(1.6 + 0.75 * len(gaits), 1.3 + 0.62 * len(gaits))
-        ax = figure.subplots()
-        image = plots.transition_matrix(ax, gaits, transition_rates(results, "survived")["expert"])
-        ax.set_title("Survived gait transitions")
-        figure.colorbar(image, ax=ax, shrink=0.85, label="fraction")
-        return figure
+        """One matrix."""
+        return plots.transition_figure(transition_rates(results, "survived"), "survived gait transitions")
 
 
 @dataclass(frozen=True)

@@ -3,8 +3,6 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import trainers
@@ -180,10 +178,10 @@ class NewGaits(Study):
         axes = figure.subplots(len(gaits), 2, sharex=True, squeeze=False)
         for (shares, errors), (gait, methods) in zip(axes, gaits.items()):
             for method, levels in methods.items():
-                _draw(shares, errors, method, levels)
+                plots.survival_and_success(shares, levels, COLORS[method], method)
+                missing = [1 - own.mean("r2") for own in levels.values()]
+                errors.plot([*levels], missing, "o-", color=COLORS[method], markersize=3.5)
             shares.set_title(gait, loc="left", fontsize=10)
-            shares.set_ylabel("survival (solid), success (dashed)", fontsize=9)
-            plots.shares(shares)
             errors.set_ylabel("1 - R2, held out", fontsize=9)
             errors.set_yscale("log")
         for ax in axes[-1]:
@@ -226,17 +224,3 @@ def old_cell(members: Group, after: Group) -> str:
         return "equal to the bit"
     changed = f"changed by up to {max(members.values('old_largest_rad')):.2g} rad"
     return f"{count(after.rate())}, {changed}" if after else changed
-
-
-def _draw(shares: Axes, errors: Axes, method: str, levels: Mapping[float, Group]) -> None:
-    color, seconds = COLORS[method], list(levels)
-    survival = [own.rate("survived") for own in levels.values()]
-    plots.band(shares, seconds, survival, color, 0.12)
-    line = {"color": color, "linewidth": 2.0}
-    shares.plot(seconds, [rate.value for rate in survival], marker="o", markersize=3.5, label=method, **line)
-    success = [own.rate().value for own in levels.values()]
-    shares.plot(seconds, success, color=color, linewidth=1.2, linestyle="--")
-    errors.plot(seconds, [1 - own.mean("r2") for own in levels.values()], **line)
-    for value, own in levels.items():
-        missing = 1 - np.array(own.values("r2"))
-        errors.plot([value] * len(missing), missing, "o", color=color, markersize=3.5, alpha=0.6)

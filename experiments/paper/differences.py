@@ -16,9 +16,9 @@ def differences(name: str, results: Results) -> str:
         f"Gains: Kp {env['kp']:g} N m/rad and Kd {env['kd']:g} N m s/rad for all gaits. Targets are q + (tau + Kd v) / "
         "Kp in both, so other gains scale them differently.",
         f"Training: AdamW, one-cycle schedule with a peak of {options['learning_rate']:g}, {options['batch_size']} "
-        f"rows per step, equally many of every gait, {loss}. Optimizer, rate, batch, duration and seeds of the paper are "
-        "not stated. Where a student was trained in bfloat16, weights, loss and all measurements are float32 still. A "
-        "network per gait draws as many rows of its gait per step as a network of all gaits does.",
+        f"rows per step, equally many of every gait, {loss}. Optimizer, rate, batch, duration and seeds of the paper "
+        "are not stated. Where a student was trained in bfloat16, weights, loss and all measurements are float32 "
+        "still. A network per gait draws as many rows of its gait per step as a network of all gaits does.",
         f"Commands: {options['train_commands']} per gait for training, drawn from ± {options['span'][0]:g} m/s forward "
         f"and ± {options['span'][1]:g} m/s sideways, yaw rate 0; the authors' own lists are not published. "
         f"{clipped(results)} Held-out ones are at least {options['gap']:g} m/s from every command of the training.",

@@ -3,14 +3,13 @@
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
 from matplotlib.figure import Figure
 
 import trainers
 from experiments import plots
 from experiments.agents import Agent
 from experiments.results import Results, distinct
-from experiments.stats import Group, Rate, group
+from experiments.stats import Group, group
 from experiments.student.commanded import DRAWN
 from experiments.student.episodes import counts, other_gaits
 from experiments.student.transitions import TransitionOptions, transition
@@ -164,7 +163,7 @@ class Ablation(Study):
         return markdown(header, rows)
 
     def figure(self, results: Results) -> Figure:
-        """A dot per variant and metric; the dotted lines are the first variant's, which the others change."""
+        """A dot per variant and metric."""
         columns = {
             "success": "success",
             "error": "velocity error [m/s]",
@@ -173,20 +172,8 @@ class Ablation(Study):
             "r2": "one-step R2",
         }
         aggregates = {name: aggregate_variant(own) for name, own in group(results.records, "agent").items()}
-        figure = plots.new_figure(2.1 * len(columns) + 1.8, 0.24 * len(aggregates) + 1.0)
-        axes = figure.subplots(1, len(columns), sharey=True)
-        for ax, (key, label) in zip(axes, columns.items()):
-            values = [_plain(own[key]) for own in aggregates.values()]
-            ax.plot(values, range(len(values)), "o", color=plots.BLUE)
-            ax.axvline(values[0], color="0.6", linewidth=0.8, linestyle=":", zorder=0)
-            ax.set_xlabel(label, fontsize=9)
-            ax.tick_params(labelsize=8)
-            ax.grid(axis="y", color="0.93")
-            if key not in ("error", "r2"):
-                ax.set_xlim(-0.04, 1.04)
-        axes[0].set_yticks(range(len(aggregates)), aggregates)
-        axes[0].invert_yaxis()
-        return figure
+        variants = {label: {name: own[key] for name, own in aggregates.items()} for key, label in columns.items()}
+        return plots.dots({label: {"variants": values} for label, values in variants.items()})
 
 
 def aggregate_variant(records: Group) -> dict[str, Any]:
@@ -201,10 +188,3 @@ def aggregate_variant(records: Group) -> dict[str, Any]:
         "error": of[DRAWN].mean("velocity_error"),
         "r2": of[HELD_OUT].mean("r2"),
     }
-
-
-def _plain(value: Rate | float | None) -> float:
-    """A rate as a fraction; NaN for nothing."""
-    if isinstance(value, Rate):
-        return value.value
-    return np.nan if value is None else value

@@ -164,22 +164,15 @@ class Budget(Study):
         return markdown(["", *budgets, *more], rows)
 
     def figure(self, results: Results) -> Figure:
-        """Survival (solid) and success (dashed) over labels, and falls while collecting them, a color per method."""
+        """Survival and success over labels, and falls while collecting them, a color per method."""
         figure = plots.new_figure(9.6, 3.6)
         shares, falls = figure.subplots(1, 2)
-        for color, (name, per_budget) in zip(COLORS, _methods(results).items()):
-            labels_s, levels = list(per_budget), list(per_budget.values())
-            survival = [level.rate("survived") for level in levels]
-            line = {"color": color, "linewidth": 2.0, "marker": "o", "markersize": 3.5}
-            plots.band(shares, labels_s, survival, color, 0.12)
-            shares.plot(labels_s, [rate.value for rate in survival], label=name, **line)
-            shares.plot(labels_s, [level.rate().value for level in levels], color=color, linewidth=1.2, linestyle="--")
-            falls.plot(labels_s, [level.mean("falls") for level in levels], **line)
+        for color, (name, levels) in zip(COLORS, _methods(results).items()):
+            plots.survival_and_success(shares, levels, color, name)
+            falls.plot([*levels], [level.mean("falls") for level in levels.values()], "o-", color=color, markersize=3.5)
         for ax in (shares, falls):
-            plots.log_ticks(ax, labels_s, "labels per gait [s]")
-        shares.set_ylabel("survival (solid), success (dashed)")
-        plots.shares(shares)
-        falls.set_ylabel("falls while collecting, all gaits")
+            plots.log_ticks(ax, [*levels], "labels per gait [s]")
+        falls.set_ylabel("falls while collecting, all gaits", fontsize=9)
         falls.set_ylim(bottom=0.0)
         plots.legend(figure, [shares])
         return figure

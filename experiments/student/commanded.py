@@ -3,15 +3,13 @@
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import trainers
 from experiments import plots
 from experiments.agents import EXPERT, PHASE_FREE, SHARED, STUDENT, Agent, Expert
 from experiments.results import Results, distinct
-from experiments.stats import Group, Rate, group
+from experiments.stats import Group, group
 from experiments.student.episodes import counts
 from experiments.student.phase import with_correction
 from experiments.study import Cell, Metrics, Study
@@ -129,29 +127,16 @@ class Commanded(Study):
         return markdown([*header, "worst ratio", "corners", "expert's", "without a clock", "own clock"], rows)
 
     def figure(self, results: Results) -> Figure:
-        """Per gait: the success of every training seed with that of all together, and velocity errors."""
-        gaits = distinct(results.records, "task")
-        figure = plots.new_figure(9.0, 3.2)
-        left, right = figure.subplots(1, 2)
-        for i, gait in enumerate(gaits):
+        """Per gait: success of all training seeds and of the worst, and velocity errors beside the expert's."""
+        success: dict[str, dict[str, Any]] = {"all seeds": {}, "worst seed": {}}
+        errors: dict[str, dict[str, float | None]] = {"all seeds": {}, "worst seed": {}, EXPERT: {}}
+        for gait in distinct(results.records, "task"):
             seeds, expert = _seeds(results, gait), _members(results, gait, EXPERT, DRAWN)
-            places = i - 0.15 + np.linspace(-0.1, 0.1, len(seeds))
-            rates = [own["succeeded"] / own["trials"] for own in seeds]
-            left.plot(places, rates, "o", color=plots.BLUE, alpha=0.6, label="each seed")
-            _interval(left, i + 0.15, seeds.rate())
-            errors = [np.nan if own["velocity_error"] is None else own["velocity_error"] for own in seeds]
-            right.plot(places, errors, "o", color=plots.BLUE, alpha=0.6)
-            if expert.values("velocity_error"):
-                color = plots.EXPERT_STYLE["color"]
-                right.plot(i + 0.15, expert.mean("velocity_error"), "D", color=color, label=EXPERT)
-        for ax, key, label in ((left, "success_rate", "success"), (right, "velocity_error", "velocity error [m/s]")):
-            ax.axhline(TARGETS[key], color="0.7", linewidth=0.8, linestyle=":", zorder=0)
-            ax.set_xticks(range(len(gaits)), gaits)
-            ax.set_ylabel(label)
-        plots.shares(left)
-        right.set_ylim(bottom=0.0)
-        plots.legend(figure, (left, right))
-        return figure
+            success["all seeds"][gait], errors["all seeds"][gait] = seeds.rate(), seeds.mean("velocity_error")
+            success["worst seed"][gait] = min((own.rate() for own in group(seeds, "seed").values()), default=None)
+            errors["worst seed"][gait] = seeds.largest("velocity_error")
+            errors[EXPERT][gait] = expert.mean("velocity_error")
+        return plots.dots({"success": success, "velocity error [m/s]": errors})
 
 
 def _members(results: Results, gait: str, agent: str, condition: str) -> Group:
@@ -167,11 +152,3 @@ def _worst_ratio(seeds: Group, expert: Group) -> float | None:
     """Largest ratio of a seed's velocity error to the expert's; None if there is none."""
     largest, reference = seeds.largest("velocity_error"), expert.mean("velocity_error")
     return largest / reference if largest is not None and reference else None
-
-
-def _interval(ax: Axes, x: float, rate: Rate) -> None:
-    """A share with its 95 % interval."""
-    if rate.trials:
-        low, high = rate.interval
-        span = [[max(0.0, rate.value - low)], [max(0.0, high - rate.value)]]
-        ax.errorbar(x, rate.value, span, color="black", marker="s", markersize=4, capsize=3, label="all, 95 %")

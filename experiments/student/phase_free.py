@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from matplotlib.figure import Figure
 
 import trainers
@@ -213,34 +212,17 @@ class PhaseFree(Study):
         return markdown(["", *gaits, *more], rows)
 
     def figure(self, results: Results) -> Figure:
-        """Success while walking, with noisy sensors and in gait transitions; the phase error from median to 99 %."""
-        agents, smallest = group(results.of(task=ALL_GAITS), "agent"), 1e-3
-        places = np.arange(len(agents))[::-1]
-        figure = plots.new_figure(9.6, 1.2 + 0.4 * len(agents))
-        shares, errors = figure.subplots(1, 2, sharey=True, width_ratios=(2, 1))
-        styles = {WALKING: (plots.BLUE, "o"), NOISY: (plots.YELLOW, "s"), TRANSITIONS: (plots.GREEN, "^")}
-        for i, (condition, (color, marker)) in enumerate(styles.items()):
-            shown = [
-                (place + 0.2 * (1 - i), Group(own for own in members if own["condition"] == condition).rate())
-                for place, members in zip(places, agents.values())
-            ]
-            known = [(height, rate) for height, rate in shown if rate.trials]
-            for height, rate in known:
-                shares.plot(rate.interval, [height] * 2, color=color, linewidth=1.0, alpha=0.6)
-            heights, rates = [height for height, _ in known], [rate.value for _, rate in known]
-            shares.plot(rates, heights, marker, color=color, markersize=5, linestyle="", label=condition)
-        for place, members in zip(places, agents.values()):
-            for own in _phase_error(members):
-                both = [max(smallest, own[name]) for name in ("median", "p99")]
-                errors.plot(both, [place, place], color="0.35", linewidth=1.5, marker="|", markersize=9)
-        errors.set_xscale("log")
-        errors.set_xlim(smallest, 0.6)
-        errors.set_xlabel("phase error [cycles]")
-        shares.set_xlim(-0.02, 1.02)
-        shares.set_xlabel("success")
-        shares.set_yticks(places, list(agents))
-        plots.legend(figure, [shares])
-        return figure
+        """Success while walking, with noisy sensors and in gait transitions; median and 99 % of the phase error."""
+        agents = group(results.of(task=ALL_GAITS), ["condition", "agent"])
+        success = {
+            condition: {agent: own.rate() for (name, agent), own in agents.items() if name == condition}
+            for condition in (WALKING, NOISY, TRANSITIONS)
+        }
+        errors = {
+            key: {agent: own.mean(key) for (name, agent), own in agents.items() if name == PHASE_ERROR}
+            for key in ("median", "p99")
+        }
+        return plots.dots({"success": success, "phase error [cycles]": errors}, log=["phase error [cycles]"])
 
 
 def _phase_error(members: Group) -> list[Record]:

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from experiments import plots
-from experiments.agents import EXPERT, STUDENT, Agent, shipped, tasks_of, with_expert
+from experiments.agents import STUDENT, Agent, shipped, tasks_of, with_expert
 from experiments.pushing import CRUISE, DIRECTIONS, PAIRS, push_w, weaker
 from experiments.results import Results, distinct
 from experiments.searches import climb
@@ -101,27 +101,14 @@ class Pushes(Study):
         return markdown(["gait", "", *(f"{name} [m/s]" for name in DIRECTIONS)], rows, text_columns=2)
 
     def figure(self, results: Results) -> Figure:
-        """Largest push per gait, in the weaker of the two directions, agents side by side."""
-        gaits, agents = distinct(results.records, "task"), distinct(results.records, "agent")
-        figure = plots.new_figure(9.6, 3.2)
-        axes = figure.subplots(1, len(PAIRS), sharey=True)
-        width, styles = 0.8 / len(agents), plots.agent_styles(agents, EXPERT)
-        for ax, (title, pair) in zip(axes, PAIRS.items()):
-            for i, agent in enumerate(agents):
-                per_gait = group(results.of(agent=agent), "task")
-                largest = [
-                    weaker({own["condition"]: own["largest"] for own in per_gait.get(gait, ())}, pair) for gait in gaits
-                ]
-                places = np.arange(len(gaits)) + (i - (len(agents) - 1) / 2) * width
-                color = "0.7" if agent == EXPERT else styles[agent]["color"]
-                bars = ax.bar(places, [size or 0.0 for size in largest], 0.92 * width, color=color, label=agent)
-                ax.bar_label(bars, ["" if size is None else f"{size:.1f}" for size in largest], fontsize=8, padding=1)
-            ax.set_xticks(range(len(gaits)), gaits)
-            ax.set_title(title, fontsize=10)
-        axes[0].set_ylabel("largest push survived [m/s]")
-        axes[0].margins(y=0.12)
-        plots.legend(figure, axes[:1])
-        return figure
+        """Largest push per gait, in the weaker of the two directions."""
+        panels: dict[str, dict[str, dict[str, float | None]]] = {}
+        for (agent, gait), members in group(results.records, ["agent", "task"]).items():
+            largest = {own["condition"]: own["largest"] for own in members}
+            for name, pair in PAIRS.items():
+                panel = panels.setdefault(f"largest push survived, {name} [m/s]", {})
+                panel.setdefault(agent, {})[gait] = weaker(largest, pair)
+        return plots.dots(panels)
 
 
 def survives(env: Any, policy: Any, cell: Cell, size: float, options: PushOptions, trial: tuple[int, int]) -> bool:

@@ -64,16 +64,8 @@ class Transitions(Study):
         return markdown(["", "from", *(f"to {gait}" for gait in gaits), "survived"], rows, text_columns=2)
 
     def figure(self, results: Results) -> Figure:
-        """One matrix per agent, from the row's gait to the column's."""
-        rates = transition_rates(results)
-        gaits = gaits_of(rates)
-        figure = plots.new_figure((1.3 + 0.75 * len(gaits)) * len(rates) + 0.5, 1.4 + 0.62 * len(gaits))
-        axes = figure.subplots(1, len(rates), squeeze=False)[0]
-        for ax, (agent, pairs) in zip(axes, rates.items()):
-            image = plots.transition_matrix(ax, gaits, pairs)
-            ax.set_title(f"{agent}: successful gait transitions", fontsize=10)
-        figure.colorbar(image, ax=axes, shrink=0.85, label="fraction")
-        return figure
+        """One matrix per agent."""
+        return plots.transition_figure(transition_rates(results), "successful gait transitions")
 
 
 def transition(agent: Agent, cell: Cell, options: TransitionOptions, seed: int) -> Metrics:

@@ -51,7 +51,7 @@ class FootholdRule:
             state.rpy[2],
             state.command,
             state.gait.nominal_feet_b,
-            np.array([state.gait.stance_s / 2, self.velocity_gain, self.reach, robot.FOOT_RADIUS]),
+            (state.gait.stance_s / 2, float(self.velocity_gain), float(self.reach), robot.FOOT_RADIUS),
             touchdown_s.reshape(-1, 4),
         )
         return points.reshape(*touchdown_s.shape, 3)
@@ -93,7 +93,7 @@ def _plan(
     yaw: float,
     command: np.ndarray,
     feet_b: np.ndarray,
-    rule: np.ndarray,
+    rule: tuple[float, float, float, float],
     touchdown_s: np.ndarray,
 ) -> np.ndarray:
     """`FootholdRule.plan` in complex numbers, x + iy. `rule`: half a stance, gain [s], reach and foot radius [m]."""

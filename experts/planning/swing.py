@@ -63,7 +63,7 @@ class SwingRule:
         progress = np.maximum(leg - gait.duty, 0.0) / (1.0 - gait.duty)
         remaining = (1.0 - progress) * gait.swing_s + ahead_s
         landing = footholds.plan(state, dynamics.com_w, velocity_w, remaining)
-        arc = np.array([gait.swing_height, self.press, self.early, gait.swing_s, gait.period, robot.FOOT_RADIUS])
+        arc = gait.swing_height, self.press, self.early, gait.swing_s, gait.period, robot.FOOT_RADIUS
         return _track(
             progress,
             ahead_s,
@@ -73,8 +73,8 @@ class SwingRule:
             to_complex(dynamics.com_w),
             to_complex(velocity_w),
             float(state.command[2]),
-            arc,
-            (self.stiffness, self.damping),
+            tuple(map(float, arc)),
+            (float(self.stiffness), float(self.damping)),
         )
 
 
@@ -102,7 +102,7 @@ def _track(
     com: complex,
     velocity: complex,
     yaw_rate: float,
-    arc: np.ndarray,
+    arc: tuple[float, ...],
     gains: tuple[float, float],
 ) -> np.ndarray:
     """`SwingRule.acceleration` for known landing points.

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from go1_mtl_gym import GAITS, robot
+from go1_mtl_gym import GAITS, TASKS, robot
 from go1_mtl_gym.env import Go1Env
 
 COMMAND = np.array([0.4, 0.1, 0.3])
@@ -160,7 +160,7 @@ def test_a_pushed_trot_recovers(push):
 
 @pytest.mark.parametrize("tasks", [("trot", "bound", "jump", "walk"), ("pace", "gallop", "trot", "pace")])
 def test_changes_of_gait_are_survived(tasks):
-    env = Go1Env(tasks[0])
+    env = Go1Env(tasks[0], tasks=tuple(TASKS))
     env.reset(seed=0, options={"command": (0.3, 0.0, 0.0)})
     for step in range(200):
         if step % 40 == 20:

@@ -43,7 +43,7 @@ class Go1Like(Protocol):
 
     @property
     def state(self) -> Any:
-        """What the expert is shown, or `estimated_state` where there is one."""
+        """What the expert is shown where there is no `estimated_state`."""
 
     def expert_action(self) -> np.ndarray:
         """The expert's action at the present state, shape (12,); without side effects."""

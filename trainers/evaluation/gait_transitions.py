@@ -46,7 +46,8 @@ def evaluate_transition(
         n_jobs: processes.
         progress: show a bar.
         make_env: another environment factory.
-        env_kwargs: of the environment, which must know both tasks; on top of the policy's own ``env_kwargs``.
+        env_kwargs: of the environment, on top of the policy's own ``env_kwargs``. It must know both tasks; unless told
+            otherwise, it knows all that are registered.
 
     Returns:
         Its task is "FIRST to SECOND", its seconds are `after_s`.
@@ -55,9 +56,9 @@ def evaluate_transition(
         InvalidInputError: if an argument is not as described.
     """
     refuse_overridden(env_kwargs, episode_s="before_s and after_s", task="first")
-    kwargs = {**getattr(policy_or_expert, "env_kwargs", {}), **env_kwargs}
+    kwargs = {"tasks": tuple(TASKS), **getattr(policy_or_expert, "env_kwargs", {}), **env_kwargs}
     for task in (first, second):
-        one_of(task, tuple(kwargs.get("tasks") or TASKS), "task")
+        one_of(task, tuple(kwargs["tasks"]), "task")
     if trials < 1 or not (before_s >= 0 and after_s > 0):
         raise InvalidInputError(
             f"trials must be >= 1, before_s >= 0 and after_s > 0, got {trials}, {before_s} and {after_s}"

@@ -63,8 +63,8 @@ def record_frames(
     """
     if not (seconds > 0 and 0 < fps <= MAX_FPS):
         raise InvalidInputError(f"seconds must be > 0 and fps from 1 to {MAX_FPS}, got {seconds} and {fps}")
-    if min(width, height) < 16 or max(width, height) > 4096:
-        raise InvalidInputError(f"width and height must be from 16 to 4096 pixels, got {width} and {height}")
+    if min(width, height) < 16 or max(width, height) > 2048:
+        raise InvalidInputError(f"width and height must be from 16 to 2048 pixels, got {width} and {height}")
     refuse_overridden(env_kwargs, episode_s="seconds", render_mode="record_frames", task="task")
     kwargs = {**getattr(policy_or_expert, "env_kwargs", {}), **env_kwargs, "episode_s": seconds + 1.0}
     kwargs |= {"render_mode": "rgb_array", "width": 2 * width, "height": 2 * height}
