@@ -41,34 +41,33 @@ def without_folders(arguments: list[str]) -> str:
 def study_parser(name: str) -> argparse.ArgumentParser:
     """The command line of one study: what all have in common, and its options."""
     cls = study_class(name)
-    style = argparse.ArgumentDefaultsHelpFormatter
-    about = {"prog": f"python -m experiments run {name}", "description": summary_line(cls), "formatter_class": style}
-    parser = argparse.ArgumentParser(**about)
+    parser = argparse.ArgumentParser(prog=f"python -m experiments run {name}", description=summary_line(cls))
     add = parser.add_argument
     add("--quick", action="store_true", help="little of everything, to see that everything works")
-    add("--seed", type=int, default=1, help="of commands, resets, noise and pushes")
+    add("--seed", type=int, default=1, help="of commands, resets, noise and pushes; %(default)s")
     add("--n-jobs", type=int, default=default_jobs(), help="processes")
     add("--only", nargs="+", default=[], help="agents, tasks and conditions; all if not given")
     add("--add", action="store_true", help="keep records of the results file that this run does not replace")
-    add("--out", type=Path, default=OUT, help="folder of the results and the picture")
+    add("--out", type=Path, default=OUT, help="folder of the results and the picture; %(default)s")
     add("--cache", type=Path, default=CACHE, help="folder of finished cells, from which an interrupted run goes on")
     if cls.takes_policies:
         add(
             "--policy", action="append", default=[], help="file of a policy, or name=file; the shipped one if not given"
         )
     for field in dataclasses.fields(cls.full):
-        _add_option(parser, field.name, getattr(cls.full, field.name))
+        _add_option(parser, field, getattr(cls.full, field.name))
     return parser
 
 
-def _add_option(parser: argparse.ArgumentParser, name: str, default: Any) -> None:
+def _add_option(parser: argparse.ArgumentParser, field: "dataclasses.Field[Any]", default: Any) -> None:
     """An option for a number, a word or several; other settings are no options."""
     several = isinstance(default, tuple) and bool(default)
     kind = type(default[0] if several else default)
     if kind in (int, float, str):
-        more = {"nargs": "+"} if several else {}
-        shown = f"{default}; quick runs have their own"
-        parser.add_argument(f"--{name.replace('_', '-')}", type=kind, default=None, help=shown, **more)
+        shown = " ".join(map(str, default)) if several else default
+        about = f"{field.metadata.get('about', '')} (whole runs: {shown})".replace("%", "%%")
+        nargs = "+" if several else None
+        parser.add_argument(f"--{field.name.replace('_', '-')}", type=kind, nargs=nargs, help=about)
 
 
 def study_of(name: str, options: argparse.Namespace) -> Study:

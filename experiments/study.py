@@ -12,7 +12,7 @@ import os
 import re
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar
@@ -282,6 +282,11 @@ def _side_by_side(calls: Sequence[Any], n_jobs: int, title: str) -> list[Any]:
 
 
 # -- Options -----------------------------------------------------------------------------------------------------------
+
+
+def option(default: Any, about: str) -> Any:
+    """A field of a study's options, and what ``--help`` says of it."""
+    return field(default=default, metadata={"about": about})
 
 
 def with_options(options: Any, given: dict[str, Any]) -> Any:

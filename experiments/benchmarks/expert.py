@@ -14,7 +14,7 @@ from experiments.benchmarks.peers import Go2ConvexMPC
 from experiments.pushing import CRUISE
 from experiments.results import Results
 from experiments.stats import group
-from experiments.study import Cell, Metrics, Study
+from experiments.study import Cell, Metrics, Study, option
 from experiments.tables import markdown
 from experts import MPCConfig, NMPCConfig, NMPCExpert
 from go1_mtl_gym import TASKS, Go1Env, Go1Error
@@ -41,18 +41,13 @@ Call = Callable[[RobotState], dict[str, float]]
 class ExpertOptions:
     """One walk at 50 Hz.
 
-    Attributes:
-        task: gait; the peer knows trot only.
-        states: at which everybody answers.
-        go2_convex_mpc: folder of a checkout of that repository; empty: without it.
-
     Raises:
         InvalidInputError: if a number is outside its range.
     """
 
-    task: str = "trot"
-    states: int = 400
-    go2_convex_mpc: str = ""
+    task: str = option("trot", "gait; the peer knows trot only")
+    states: int = option(400, "at which everybody answers")
+    go2_convex_mpc: str = option("", "folder of a checkout of that repository; empty: without it")
 
     def __post_init__(self) -> None:
         one_of(self.task, tuple(TASKS), "task")
@@ -82,7 +77,6 @@ class ExpertBenchmark(Study):
         return [Cell(self.options.task)]
 
     def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:
-        """Median and 99th percentile of everybody and scope, ratios to ours, and distances from the exact forces."""
         calls = contestants(self.options)
         times: dict[tuple[str, str], list[float]] = {}
         errors: dict[str, list[float]] = {}
@@ -108,12 +102,10 @@ class ExpertBenchmark(Study):
         return records + [{"agent": name, "condition": FORCE_ERROR, **own} for name, own in forces.items()]
 
     def published_options(self) -> dict[str, Any]:
-        """Without the folder, which only its machine knows."""
         checkout = "PATH" if self.options.go2_convex_mpc else ""
         return super().published_options() | {"go2_convex_mpc": checkout}
 
     def table(self, results: Results) -> str:
-        """One row per thing timed and contestant."""
         scopes, rows = group(results.records, "condition"), []
         for scope, meaning in SCOPES.items():
             for own in scopes.get(scope, ()):

@@ -55,12 +55,10 @@ class TrainingBenchmark(Study):
         return [Cell(name) for name in self.options.sections]
 
     def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:
-        """A record per setting and contestant."""
         _, heats = SECTIONS[cell.task]
         return [record for heat in heats(self.options) for record in run(heat, self.options.rounds)]
 
     def table(self, results: Results) -> str:
-        """One table per section: rates, and how they compare within each round."""
         sections = group(results.records, "task").items()
         return "\n\n".join(f"**{SECTIONS[name][0]}**\n\n{_table(members)}" for name, members in sections)
 

@@ -12,6 +12,7 @@ import torch
 from threadpoolctl import threadpool_limits
 
 from experiments.stats import spread
+from experiments.study import option
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import number_in
 from trainers.algorithms.optimizer import torch_threads
@@ -30,38 +31,25 @@ Turn = Callable[[int], dict[str, float]]
 class TrainingOptions:
     """How much of everything.
 
-    Attributes:
-        sections: which of the benchmark's.
-        device: "cpu", or "cuda" where PyTorch finds a GPU.
-        rounds: how often everybody has a turn.
-        data_seed: of data, weights and orders.
-        batch_size: rows per gradient step.
-        rows: of the made-up demonstrations.
-        widths: units per hidden layer.
-        threads: of PyTorch.
-        steps: gradient steps per turn that are timed.
-        learning_steps: gradient steps after which losses are compared.
-        heads: numbers of heads.
-        stored_rows: rows that are read from disk and shuffled.
-        collect_s: seconds of robot's time collected per turn.
-
     Raises:
         InvalidInputError: if a number is out of its range or the device is not there.
     """
 
-    sections: tuple[str, ...] = ("step", "heads", "precision", "reading", "shuffling", "collection")
-    device: str = "cpu"
-    rounds: int = 9
-    data_seed: int = 0
-    batch_size: int = 1024
-    rows: int = 200_000
-    widths: tuple[int, ...] = (512, 2560)
-    threads: tuple[int, ...] = (1, 2)
-    steps: int = 12
-    learning_steps: int = 400
-    heads: tuple[int, ...] = (1, 2, 4, 8, 16)
-    stored_rows: int = 1_800_000
-    collect_s: float = 4.0
+    sections: tuple[str, ...] = option(
+        ("step", "heads", "precision", "reading", "shuffling", "collection"), "which of the benchmark's"
+    )
+    device: str = option("cpu", "'cpu', or 'cuda' where PyTorch finds a GPU")
+    rounds: int = option(9, "how often everybody has a turn")
+    data_seed: int = option(0, "of data, weights and orders")
+    batch_size: int = option(1024, "rows per gradient step")
+    rows: int = option(200_000, "of the made-up demonstrations")
+    widths: tuple[int, ...] = option((512, 2560), "units per hidden layer")
+    threads: tuple[int, ...] = option((1, 2), "of PyTorch")
+    steps: int = option(12, "gradient steps per turn that are timed")
+    learning_steps: int = option(400, "gradient steps after which losses are compared")
+    heads: tuple[int, ...] = option((1, 2, 4, 8, 16), "numbers of heads")
+    stored_rows: int = option(1_800_000, "rows that are read from disk and shuffled")
+    collect_s: float = option(4.0, "seconds of robot's time collected per turn")
 
     def __post_init__(self) -> None:
         checked_device(self.device)

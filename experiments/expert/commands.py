@@ -9,6 +9,7 @@ import numpy as np
 from experiments.expert.lab import ExpertOptions, ExpertStudy, Lab
 from experiments.results import Results
 from experiments.stats import Group, group
+from experiments.study import option
 from experiments.tables import count, markdown, number
 
 ONE, CHANGING = "one command", "new commands"
@@ -16,17 +17,11 @@ ONE, CHANGING = "one command", "new commands"
 
 @dataclass(frozen=True)
 class CommandOptions(ExpertOptions):
-    """Drawn commands.
+    """Drawn commands."""
 
-    Attributes:
-        episodes: per gait.
-        seconds: duration of each [s].
-        change_s: time between changing commands [s].
-    """
-
-    episodes: int = 20
-    seconds: float = 30.0
-    change_s: float = 5.0
+    episodes: int = option(20, "per gait")
+    seconds: float = option(30.0, "duration of each [s]")
+    change_s: float = option(5.0, "time between changing commands [s]")
 
 
 class Commands(ExpertStudy):
@@ -38,7 +33,6 @@ class Commands(ExpertStudy):
     quick = CommandOptions(("trot", "jump"), episodes=1, seconds=3.0, change_s=2.0)
 
     def measure_in(self, lab: Lab, task: str, seed: int) -> list[dict[str, Any]]:
-        """One record per episode."""
         options, records = self.options, []
         for condition, interval in ((ONE, None), (CHANGING, options.change_s)):
             result = lab.score(task, options.seconds, seed, options.episodes, command_interval=interval)
@@ -46,11 +40,9 @@ class Commands(ExpertStudy):
         return records
 
     def table(self, results: Results) -> str:
-        """Metrics of episodes with one command."""
         return closed_loop_table(group(results.of(condition=ONE), "task"))
 
     def paragraphs(self, results: Results) -> list[str]:
-        """Both kinds of commands."""
         changing = closed_loop_table(group(results.of(condition=CHANGING), "task"))
         return [self.table(results), "The same with commands that change:", changing]
 

@@ -11,7 +11,7 @@ import numpy as np
 import experts
 import trainers
 from experiments.agents import Agent, Expert
-from experiments.study import Cell, Metrics, Study
+from experiments.study import Cell, Metrics, Study, option
 from go1_mtl_gym import TASKS
 from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.robot import HOME_POSE
@@ -187,15 +187,10 @@ def shared_range(*tasks: str) -> np.ndarray:
 
 @dataclasses.dataclass(frozen=True)
 class ExpertOptions:
-    """What all studies of the expert share.
+    """What all studies of the expert share."""
 
-    Attributes:
-        tasks: the gaits.
-        control_hz: rate of the expert and of the joint targets [Hz].
-    """
-
-    tasks: tuple[str, ...] = tuple(TASKS)
-    control_hz: int = 50
+    tasks: tuple[str, ...] = option(tuple(TASKS), "the gaits")
+    control_hz: int = option(50, "rate of the expert and of the joint targets [Hz]")
 
 
 class ExpertStudy(Study):

@@ -7,6 +7,7 @@ import numpy as np
 
 from experiments.expert.lab import ExpertOptions, ExpertStudy, Lab, generator
 from experiments.results import Results
+from experiments.study import option
 from experiments.tables import markdown
 from experts import NMPCExpert
 from experts.phase_fitting import fit_phase
@@ -17,21 +18,13 @@ from go1_mtl_gym.sensing.state import RobotState
 
 @dataclass(frozen=True)
 class LabelOptions(ExpertOptions):
-    """States along walks at drawn commands, at which labels are compared.
+    """States along walks at drawn commands, at which labels are compared."""
 
-    Attributes:
-        walks: per gait.
-        seconds: duration of each; the first does not count [s].
-        every: control steps between two states.
-        shift: by how much the gait clock is put wrong [cycles].
-        distance: how far robots are displaced at most [m].
-    """
-
-    walks: int = 5
-    seconds: float = 6.0
-    every: int = 5
-    shift: float = 0.25
-    distance: float = 100.0
+    walks: int = option(5, "per gait")
+    seconds: float = option(6.0, "duration of each; the first does not count [s]")
+    every: int = option(5, "control steps between two states")
+    shift: float = option(0.25, "by how much the gait clock is put wrong [cycles]")
+    distance: float = option(100.0, "how far robots are displaced at most [m]")
 
 
 class Labels(ExpertStudy):
@@ -43,11 +36,9 @@ class Labels(ExpertStudy):
     quick = LabelOptions(("trot", "jump"), walks=1, seconds=1.5)
 
     def measure_in(self, lab: Lab, task: str, seed: int) -> list[dict[str, Any]]:
-        """Differences of one gait, see `labels`."""
         return [labels(lab, task, self.options, seed)]
 
     def table(self, results: Results) -> str:
-        """One row per gait."""
         rows = []
         for own in results.records:
             counts = [str(own[name]) for name in ("states", "asked_again")]

@@ -12,6 +12,7 @@ from experiments.pushing import CRUISE, DIRECTIONS, push_w
 from experiments.results import Results
 from experiments.searches import climb_from, scouted
 from experiments.stats import group
+from experiments.study import option
 from experiments.tables import markdown, number
 from go1_mtl_gym import TASKS
 from trainers.data.environments import derive_seed
@@ -32,21 +33,13 @@ Errors = tuple[float, float]
 
 @dataclass(frozen=True)
 class LimitOptions(ExpertOptions):
-    """The search for the largest command.
+    """The search for the largest command."""
 
-    Attributes:
-        trials: episodes that must all survive.
-        scouts: episodes tried on the way up, before the whole number is tried on the way down.
-        seconds: duration of an episode [s].
-        grid: largest number of steps above the task's own range.
-        axes: which of `AXES`.
-    """
-
-    trials: int = 20
-    scouts: int = 2
-    seconds: float = 10.0
-    grid: int = 100
-    axes: tuple[str, ...] = tuple(AXES)
+    trials: int = option(20, "episodes that must all survive")
+    scouts: int = option(2, "episodes tried on the way up, before the whole number is tried on the way down")
+    seconds: float = option(10.0, "duration of an episode [s]")
+    grid: int = option(100, "largest number of steps above the task's own range")
+    axes: tuple[str, ...] = option(tuple(AXES), "which of AXES")
 
 
 class Limits(ExpertStudy):
@@ -64,7 +57,6 @@ class Limits(ExpertStudy):
     code = (*ExpertStudy.code, "experiments.searches")
 
     def measure_in(self, lab: Lab, task: str, seed: int) -> list[dict[str, Any]]:
-        """One record per axis."""
         return [{"condition": axis, **self._search(lab, task, axis, seed)} for axis in self.options.axes]
 
     def _search(self, lab: Lab, task: str, axis: str, seed: int) -> dict[str, Any]:
@@ -96,7 +88,6 @@ class Limits(ExpertStudy):
         return {"survived_to": level, "tracked_to": tracked, **means, "at_cap": at_cap}
 
     def table(self, results: Results) -> str:
-        """Per gait and axis."""
         rows = []
         for own in results.records:
             errors = [number(own[name], ".3f") for name in ("velocity_error", "yaw_rate_error")]
@@ -113,7 +104,6 @@ class Limits(ExpertStudy):
         return markdown(header, rows, text_columns=2)
 
     def figure(self, results: Results) -> Figure:
-        """A panel per axis."""
         titles = {"vx": "forward [m/s]", "-vx": "backward [m/s]", "vy": "sideways [m/s]", "yaw": "yaw rate [rad/s]"}
         series = {"survived": "survived_to", "and tracked": "tracked_to"}
         return plots.dots(
@@ -144,23 +134,15 @@ def episodes(lab: Lab, task: str, axis: str, level: float, trials: int, seconds:
 
 @dataclass(frozen=True)
 class PushOptions(ExpertOptions):
-    """The search for the largest push.
+    """The search for the largest push."""
 
-    Attributes:
-        phases: of the cycle, evenly spaced, at each of which the push must be survived.
-        first, step: grid of pushes [m/s]; below the first one it is searched downward.
-        grid: largest number of steps above the first.
-        before_s, after_s: walking before the push, and without a fall after it [s].
-        directions: which of `DIRECTIONS`.
-    """
-
-    phases: int = 8
-    first: float = 0.6
-    step: float = 0.1
-    grid: int = 40
-    before_s: float = 1.5
-    after_s: float = 3.0
-    directions: tuple[str, ...] = tuple(DIRECTIONS)
+    phases: int = option(8, "of the cycle, evenly spaced, at each of which the push must be survived")
+    first: float = option(0.6, "grid of pushes [m/s]; below the first one it is searched downward")
+    step: float = option(0.1, "grid of pushes [m/s]; below the first one it is searched downward")
+    grid: int = option(40, "largest number of steps above the first")
+    before_s: float = option(1.5, "walking before the push, and without a fall after it [s]")
+    after_s: float = option(3.0, "walking before the push, and without a fall after it [s]")
+    directions: tuple[str, ...] = option(tuple(DIRECTIONS), "which of DIRECTIONS")
 
 
 class Pushes(ExpertStudy):
@@ -175,14 +157,12 @@ class Pushes(ExpertStudy):
     code = (*ExpertStudy.code, "experiments.pushing", "experiments.searches")
 
     def measure_in(self, lab: Lab, task: str, seed: int) -> list[dict[str, Any]]:
-        """One record per direction."""
         found = {
             direction: largest_push(lab, task, direction, self.options, seed) for direction in self.options.directions
         }
         return [{"condition": direction, "largest": largest} for direction, largest in found.items()]
 
     def table(self, results: Results) -> str:
-        """Per gait, in every direction [m/s]."""
         rows = []
         for gait, members in group(results.records, "task").items():
             largest = {own["condition"]: own["largest"] for own in members}
@@ -190,7 +170,6 @@ class Pushes(ExpertStudy):
         return markdown(["gait", *(f"{name} [m/s]" for name in DIRECTIONS)], rows)
 
     def figure(self, results: Results) -> Figure:
-        """A dot per direction."""
         directions = group(results.records, "condition").items()
         largest = {direction: {own["task"]: own["largest"] for own in members} for direction, members in directions}
         return plots.dots({"largest push survived [m/s]": largest})

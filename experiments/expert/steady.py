@@ -12,6 +12,7 @@ from experiments import plots
 from experiments.expert.lab import ExpertOptions, ExpertStudy, Lab, generator
 from experiments.pushing import CRUISE
 from experiments.results import Record, Results
+from experiments.study import option
 from experiments.tables import markdown, number
 from go1_mtl_gym import TASKS, Gait, robot
 from go1_mtl_gym.actuation import PHYSICS_HZ
@@ -23,17 +24,11 @@ SATURATED = 0.999
 
 @dataclass(frozen=True)
 class SteadyOptions(ExpertOptions):
-    """Two rollouts: one at `CRUISE`, one at a drawn command.
+    """Two rollouts: one at `CRUISE`, one at a drawn command."""
 
-    Attributes:
-        seconds: duration of each [s].
-        skip_s: start that does not count [s].
-        cycles: of the gait whose contacts are kept for the picture.
-    """
-
-    seconds: float = 10.0
-    skip_s: float = 2.0
-    cycles: int = 2
+    seconds: float = option(10.0, "duration of each [s]")
+    skip_s: float = option(2.0, "start that does not count [s]")
+    cycles: int = option(2, "of the gait whose contacts are kept for the picture")
 
 
 COLUMNS = {
@@ -60,7 +55,6 @@ class Steady(ExpertStudy):
     quick = SteadyOptions(("trot",), seconds=3.5)
 
     def measure_in(self, lab: Lab, task: str, seed: int) -> list[dict[str, Any]]:
-        """The walk at 0.3 m/s with "schedule", the contacts of its last cycles, and the one at a drawn command."""
         drawn = TASKS[task].draw_command(generator("steady", task, seed))
         return [
             {"condition": "cruise", **_rollout(lab, task, np.array(CRUISE), self.options, seed, schedule=True)},
@@ -68,7 +62,6 @@ class Steady(ExpertStudy):
         ]
 
     def table(self, results: Results) -> str:
-        """Contacts, effort, posture and tracking of both walks."""
         rows = []
         for own in results.records:
             command = " ".join(f"{value:.2f}" for value in own["command"])
@@ -79,7 +72,6 @@ class Steady(ExpertStudy):
         return markdown(header, rows, text_columns=3)
 
     def figure(self, results: Results) -> Figure:
-        """Feet on the ground over two cycles: planned in gray, measured in color."""
         known = [own for own in results.records if "schedule" in own]
         columns = 2 if len(known) > 1 else 1
         rows = max(1, -(-len(known) // columns))

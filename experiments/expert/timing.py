@@ -15,6 +15,7 @@ from experiments.expert.limits import PushOptions, largest_push
 from experiments.pushing import CRUISE
 from experiments.results import Results
 from experiments.stats import Group, group
+from experiments.study import option
 from experiments.tables import count, markdown, number
 from experts import NMPCConfig, NMPCExpert
 from experts.nmpc import WHOLE_BODY
@@ -45,19 +46,12 @@ def make_expert(name: str) -> Callable[..., Any]:
 
 @dataclass(frozen=True)
 class TimingOptions(ExpertOptions):
-    """Measuring time, alone on a core.
+    """Measuring time, alone on a core."""
 
-    Attributes:
-        states: along a walk, at each of which the expert is asked.
-        rates: of control, at which the multiple of real time is measured [Hz].
-        blocks: repetitions, of which the median counts.
-        block_s: simulated time of a block [s].
-    """
-
-    states: int = 500
-    rates: tuple[int, ...] = (50, 1000)
-    blocks: int = 7
-    block_s: float = 1.0
+    states: int = option(500, "along a walk, at each of which the expert is asked")
+    rates: tuple[int, ...] = option((50, 1000), "of control, at which the multiple of real time is measured [Hz]")
+    blocks: int = option(7, "repetitions, of which the median counts")
+    block_s: float = option(1.0, "simulated time of a block [s]")
 
 
 class Timing(ExpertStudy):
@@ -71,7 +65,6 @@ class Timing(ExpertStudy):
     alone = True
 
     def measure_in(self, lab: Lab, task: str, seed: int) -> list[dict[str, Any]]:
-        """Times of an action, of the MPC update in it and of each other setting's action; multiples of real time."""
         states = walked_states(lab, task, self.options.states, seed)
         labs = {name: Lab(lab.env.control_hz, make_expert(name)) for name in SETTINGS if task in COMPARED}
         for own in labs.values():
@@ -92,7 +85,6 @@ class Timing(ExpertStudy):
         ]
 
     def table(self, results: Results) -> str:
-        """Milliseconds per answer and multiples of real time."""
         rows = []
         for gait, members in group(results.records, "task").items():
             of = group(members, "condition")
@@ -104,7 +96,6 @@ class Timing(ExpertStudy):
         return markdown([*header, "environment x", "MuJoCo x", "expert / MuJoCo"], rows, text_columns=2)
 
     def paragraphs(self, results: Results) -> list[str]:
-        """Times, and those of the settings that are compared."""
         compared = group(results.of(condition=COMPARED_ACTION), "agent")
         gaits = list(dict.fromkeys(own["task"] for members in compared.values() for own in members))
         rows = [[name, *(f"{own['median_ms']:.2f}" for own in members)] for name, members in compared.items()]
@@ -218,7 +209,6 @@ class Settings(ExpertStudy):
         return [Agent(name) for name in SETTINGS]
 
     def measure(self, agent: Agent, cell: Any, seed: int) -> dict[str, Any]:
-        """Survival and velocity error [m/s] with drawn commands, and the largest push to the side [m/s]."""
         options, lab = self.options, Lab(self.options.control_hz, make_expert(agent.name))
         walked = lab.score(cell.task, options.seconds, seed, options.episodes)
         pushes = [largest_push(lab, cell.task, direction, options.push, seed) for direction in options.push.directions]
@@ -227,11 +217,9 @@ class Settings(ExpertStudy):
         return counts | {"lateral_push": min(pushes)} | vars(lab.settle())
 
     def measure_in(self, lab: Lab, task: str, seed: int) -> list[dict[str, Any]]:
-        """Not used: every agent has a lab of its own."""
         raise NotImplementedError
 
     def table(self, results: Results) -> str:
-        """One row per gait and settings."""
         rows = []
         for (task, agent), own in sorted_by_task(results):
             values = [number(own.mean("velocity_error"), ".3f"), number(own.mean("lateral_push"), ".1f")]

@@ -11,23 +11,18 @@ from experiments.expert.lab import ExpertOptions, ExpertStudy, Lab, generator, s
 from experiments.results import Results
 from experiments.stats import group
 from experiments.student.transitions import transition_rates
+from experiments.study import option
 from experiments.tables import count, markdown
 from go1_mtl_gym import TASKS
 
 
 @dataclass(frozen=True)
 class TransitionOptions(ExpertOptions):
-    """Changes of gait while walking.
+    """Changes of gait while walking."""
 
-    Attributes:
-        trials: per ordered pair of gaits.
-        before_s: walking in the first gait [s]; a random part of its period is added.
-        after_s: walking in the second gait [s].
-    """
-
-    trials: int = 20
-    before_s: float = 2.0
-    after_s: float = 4.0
+    trials: int = option(20, "per ordered pair of gaits")
+    before_s: float = option(2.0, "walking in the first gait [s]; a random part of its period is added")
+    after_s: float = option(4.0, "walking in the second gait [s]")
 
 
 class Transitions(ExpertStudy):
@@ -41,7 +36,6 @@ class Transitions(ExpertStudy):
     quick = TransitionOptions(("trot", "jump"), trials=1, after_s=1.0)
 
     def measure_in(self, lab: Lab, task: str, seed: int) -> list[dict[str, Any]]:
-        """One record per gait that is changed to; a fall before the change is not a trial."""
         options, records = self.options, []
         for target in (name for name in options.tasks if name != task):
             survived = trials = 0
@@ -57,32 +51,22 @@ class Transitions(ExpertStudy):
         return records
 
     def table(self, results: Results) -> str:
-        """Per gait that is left."""
         rows = [[gait, count(own.rate("survived"))] for gait, own in group(results.records, "task").items()]
         return markdown(["from", "survived"], rows)
 
     def figure(self, results: Results) -> Figure:
-        """One matrix."""
         return plots.transition_figure(transition_rates(results, "survived"), "survived gait transitions")
 
 
 @dataclass(frozen=True)
 class LongWalkOptions(ExpertOptions):
-    """A long walk in which everything changes.
+    """A long walk in which everything changes."""
 
-    Attributes:
-        steps: control steps per gait that it begins with.
-        command_s: time between new commands [s].
-        transition_s: mean time between changes of gait [s].
-        push_s: mean time between pushes [s].
-        push: largest change of the base's velocity [m/s].
-    """
-
-    steps: int = 35_000
-    command_s: float = 2.0
-    transition_s: float = 5.0
-    push_s: float = 3.0
-    push: float = 0.5
+    steps: int = option(35_000, "control steps per gait that it begins with")
+    command_s: float = option(2.0, "time between new commands [s]")
+    transition_s: float = option(5.0, "mean time between changes of gait [s]")
+    push_s: float = option(3.0, "mean time between pushes [s]")
+    push: float = option(0.5, "largest change of the base's velocity [m/s]")
 
 
 class LongWalk(ExpertStudy):
@@ -95,7 +79,6 @@ class LongWalk(ExpertStudy):
     quick = LongWalkOptions(("trot", "jump"), steps=100)
 
     def measure_in(self, lab: Lab, task: str, seed: int) -> list[dict[str, Any]]:
-        """Walk until the steps are used up; a fall begins a new episode."""
         options, hz, rng = self.options, lab.env.control_hz, generator("soak", task, seed)
         span, steps, falls, transitions, pushes, fallen = shared_range(*options.tasks), 0, 0, 0, 0, True
         while steps < options.steps:
@@ -116,7 +99,6 @@ class LongWalk(ExpertStudy):
         return [{"steps": steps, "transitions": transitions, "pushes": pushes, "falls": falls}]
 
     def table(self, results: Results) -> str:
-        """Steps and falls per gait that a walk began in."""
         names = ("steps", "transitions", "pushes", "falls")
         rows = [[own["task"], *(str(own[name]) for name in names)] for own in results.records if "steps" in own]
         return markdown(["begun in", "control steps", "gait transitions", "pushes", "falls"], rows)

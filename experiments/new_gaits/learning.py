@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 import trainers
+from experiments.study import option
 from experiments.training_runs import kept_policy, rows_of
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import number_in
@@ -32,29 +33,24 @@ SEEN = ("channels", "history", "control_hz", "kp", "kd")
 class NewGaitOptions:
     """What all methods share.
 
-    Attributes:
-        gaits: that the trained policy is to learn, each by itself.
-        job: `clone_steps` of every training, shards, held-out seconds and evaluation; `clean_s` and `perturbed_s` say
-            in which proportion demonstrations are perturbed. Its seed and tasks are not used; observation and network
-            are the trained policy's.
-        demonstrations_s: of the new gait [s], rising; whole shards of the job.
-        seeds: of demonstrations, heads and trainings.
-        rehearsal_s: that the trained policy walks by itself per gait, for rehearsal [s].
-        tuning_rate: peak learning rate where the whole network is tuned.
-        old_episodes: per old gait, after tuning.
-
     Raises:
         InvalidInputError: if the seconds do not rise or are no whole shards, there is no seed, or a number is not
             positive.
     """
 
-    gaits: tuple[str, ...] = ("pace", "gallop")
-    job: JobConfig = JobConfig(n_envs=1, clone_steps=3000, batch_size=512)
-    demonstrations_s: tuple[float, ...] = (15.0, 30.0, 60.0, 120.0, 240.0)
-    seeds: tuple[int, ...] = (0, 1, 2)
-    rehearsal_s: float = 60.0
-    tuning_rate: float = 1e-3
-    old_episodes: int = 5
+    gaits: tuple[str, ...] = option(("pace", "gallop"), "that the trained policy is to learn, each by itself")
+    job: JobConfig = option(
+        JobConfig(n_envs=1, clone_steps=3000, batch_size=512),
+        "clone_steps of every training, shards, evaluation, and in clean_s and perturbed_s the proportion of both; "
+        "tasks, observation and network are the trained policy's",
+    )
+    demonstrations_s: tuple[float, ...] = option(
+        (15.0, 30.0, 60.0, 120.0, 240.0), "of the new gait [s], rising; whole shards of the job"
+    )
+    seeds: tuple[int, ...] = option((0, 1, 2), "of demonstrations, heads and trainings")
+    rehearsal_s: float = option(60.0, "that the trained policy walks by itself per gait, for rehearsal [s]")
+    tuning_rate: float = option(1e-3, "peak learning rate where the whole network is tuned")
+    old_episodes: int = option(5, "per old gait, after tuning")
 
     def __post_init__(self) -> None:
         shards = [value / self.job.shard_s for value in self.demonstrations_s]

@@ -146,7 +146,6 @@ class NewGaits(Study):
         return [{"task": task, "condition": condition, **self._walk(policy, task, episodes, seed)} for task in tasks]
 
     def table(self, results: Results) -> str:
-        """One row per gait and method, and a sentence on those that they are compared with."""
         rows, budgets = [], []
         for gait, methods in _by_method(results).items():
             for method, levels in methods.items():
@@ -172,7 +171,6 @@ class NewGaits(Study):
         )
 
     def figure(self, results: Results) -> Figure:
-        """Per gait: survival and success by seconds of demonstrations, and what is left to explain of the actions."""
         gaits = _by_method(results)
         figure = plots.new_figure(9.6, 2.9 * len(gaits) + 0.3)
         axes = figure.subplots(len(gaits), 2, sharex=True, squeeze=False)

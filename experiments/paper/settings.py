@@ -9,6 +9,7 @@ import numpy as np
 
 import trainers
 from experiments.paper.published import KINDS
+from experiments.study import option
 from experts import HARDWARE_LIKE
 from go1_mtl_gym import TASKS, EstimatorNoise
 from go1_mtl_gym.env_config import EXPERT_ONLY
@@ -102,50 +103,31 @@ TABLES = MappingProxyType({table.name: table for table in (SIMULATION, HARDWARE,
 class PaperOptions:
     """How much is collected and how it is cloned, in every table.
 
-    Attributes:
-        train_commands: per gait; 20 in the paper.
-        unseen_commands: per gait, held out on top of those that the authors name.
-        seconds: recorded with each command [s], at most an episode; 30 in the paper.
-        span: largest |vx| and |vy| of a drawn command [m/s]; those of the paper. The yaw rate is 0.
-        gap: held-out commands are at least this far from every other one [m/s].
-        data_seed: of commands and episodes; trainings have their own.
-        widths: units of every hidden layer, a policy each; 2560 in the paper.
-        seeds: of the trainings.
-        steps: gradient steps of every training.
-        batch_size: rows per step, shared evenly among the gaits.
-        learning_rate: peak of the one-cycle schedule.
-        normalization: of inputs and outputs; the paper's is "min_max".
-        space: of the loss, see `trainers.BCConfig`.
-        precision: of the trainings, one of `PRECISIONS`.
-        curve_points: entries of a curve of the held-out loss.
-        curve_rows: held-out rows per gait that such an entry is measured on.
-        kinds: of policies.
-        device: of the trainings, "cpu" or "cuda".
-        threads: of each training on a CPU; changes the last digits.
-
     Raises:
         InvalidInputError: if a number is outside its range, or the device is not there.
     """
 
-    train_commands: int = 20
-    unseen_commands: int = 10
-    seconds: float = EPISODE_S
-    span: tuple[float, float] = (0.8, 0.5)
-    gap: float = 0.05
-    data_seed: int = 0
-    widths: tuple[int, ...] = (512,)
-    seeds: tuple[int, ...] = (0, 1, 2, 3, 4)
-    steps: int = 20_000
-    batch_size: int = 1024
-    learning_rate: float = 2e-3
-    normalization: str = "min_max"
-    space: str = "radians"
-    precision: str = "bfloat16"
-    curve_points: int = 40
-    curve_rows: int = 3000
-    kinds: tuple[str, ...] = tuple(KINDS)
-    device: str = "cpu"
-    threads: int = 1
+    train_commands: int = option(20, "per gait; 20 in the paper")
+    unseen_commands: int = option(10, "per gait, held out on top of those that the authors name")
+    seconds: float = option(EPISODE_S, "recorded with each command [s], at most an episode; 30 in the paper")
+    span: tuple[float, float] = option(
+        (0.8, 0.5), "largest |vx| and |vy| of a drawn command [m/s]; those of the paper. The yaw rate is 0"
+    )
+    gap: float = option(0.05, "held-out commands are at least this far from every other one [m/s]")
+    data_seed: int = option(0, "of commands and episodes; trainings have their own")
+    widths: tuple[int, ...] = option((512,), "units of every hidden layer, a policy each; 2560 in the paper")
+    seeds: tuple[int, ...] = option((0, 1, 2, 3, 4), "of the trainings")
+    steps: int = option(20_000, "gradient steps of every training")
+    batch_size: int = option(1024, "rows per step, shared evenly among the gaits")
+    learning_rate: float = option(2e-3, "peak of the one-cycle schedule")
+    normalization: str = option("min_max", "of inputs and outputs; the paper's is 'min_max'")
+    space: str = option("radians", "of the loss, see trainers.BCConfig")
+    precision: str = option("bfloat16", "of the trainings, one of PRECISIONS")
+    curve_points: int = option(40, "entries of a curve of the held-out loss")
+    curve_rows: int = option(3000, "held-out rows per gait that such an entry is measured on")
+    kinds: tuple[str, ...] = option(tuple(KINDS), "of policies")
+    device: str = option("cpu", "of the trainings, 'cpu' or 'cuda'")
+    threads: int = option(1, "of each training on a CPU; changes the last digits")
 
     def __post_init__(self) -> None:
         for name in ("train_commands", "unseen_commands"):

@@ -81,7 +81,6 @@ class PaperStudy(Study):
         collect([job for jobs in shard_jobs(self.table_of, self.options).values() for job in jobs], self.folder, n_jobs)
 
     def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:
-        """Train a network and measure it, or sum up the data; the evaluation draws nothing."""
         if agent.name == EXPERT:
             return account(self.table_of, self.options, self.folder)
         return self.network(agent.name, int(cell.condition.split()[0]), cell.seed, cell.task).train()
@@ -92,7 +91,6 @@ class PaperStudy(Study):
         return Network(self.table_of, self.options, self.folder, kind, width, seed, gait)
 
     def more(self) -> dict[str, Any]:
-        """What makes the world, and the largest commands."""
         jobs = shard_jobs(self.table_of, self.options)[TRAIN]
         largest = {gait: self.options.largest(gait) for gait in self.table_of.gaits}
         return {"env_kwargs": jobs[0].as_dict()["env_kwargs"], "largest": largest}
@@ -100,11 +98,9 @@ class PaperStudy(Study):
     # -- Shown ---------------------------------------------------------------------------------------------------------
 
     def table(self, results: Results) -> str:
-        """One row per gait and learner on the first of the held-out rows, after the rows of the paper."""
         return score_table(self.table_of.published, results, uses(results)[0], paper=True)
 
     def paragraphs(self, results: Results) -> list[str]:
-        """All held-out rows, the targets, what differs, data and training."""
         name, parts = self.table_of.published, []
         for i, use in enumerate(uses(results)):
             parts += [f"With {USES[use]}:", score_table(name, results, use, paper=i == 0)]
@@ -122,7 +118,6 @@ class PaperStudy(Study):
         ]
 
     def figure(self, results: Results) -> Figure:
-        """Held-out loss over gradient steps, a panel per gait and a line per network, pooled against multi-head."""
         colors, styles = {MULTI_HEAD: plots.BLUE, POOLED: plots.RED}, ("-", "--", ":", "-.")
         curves = [own for own in results.of(condition=CURVE) if own["agent"] in colors]
         widths = sorted({own["width"] for own in curves}, reverse=True)

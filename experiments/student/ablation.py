@@ -13,7 +13,7 @@ from experiments.stats import Group, group
 from experiments.student.commanded import DRAWN
 from experiments.student.episodes import counts, other_gaits
 from experiments.student.transitions import TransitionOptions, transition
-from experiments.study import Cell, Metrics, Study
+from experiments.study import Cell, Metrics, Study, option
 from experiments.tables import count, markdown, number, settings
 from experiments.training_runs import TrainedPolicy, TrainingRun, changed
 from trainers.pipeline.config import JobConfig
@@ -63,25 +63,15 @@ VARIANTS: dict[str, dict[str, Any]] = {
 
 @dataclass(frozen=True)
 class AblationOptions:
-    """Drawn commands that change, in two worlds, and changes of gait.
+    """Drawn commands that change, in two worlds, and changes of gait."""
 
-    Attributes:
-        training_seed: of every variant.
-        variants: which of `VARIANTS`.
-        episodes, changed_episodes: per gait, in the model's world and in the changed one.
-        seconds: duration of each [s].
-        command_interval: time between commands [s].
-        transitions: the changes of gait.
-        reduced: settings of the main job that all variants share.
-    """
-
-    training_seed: int = 0
-    variants: tuple[str, ...] = tuple(VARIANTS)
-    episodes: int = 20
-    changed_episodes: int = 5
-    seconds: float = 20.0
-    command_interval: float = 5.0
-    transitions: TransitionOptions = TransitionOptions(trials=3)
+    training_seed: int = option(0, "of every variant")
+    variants: tuple[str, ...] = option(tuple(VARIANTS), "which of VARIANTS")
+    episodes: int = option(20, "per gait, in the model's world and in the changed one")
+    changed_episodes: int = option(5, "per gait, in the model's world and in the changed one")
+    seconds: float = option(20.0, "duration of each [s]")
+    command_interval: float = option(5.0, "time between commands [s]")
+    transitions: TransitionOptions = option(TransitionOptions(trials=3), "the changes of gait")
     reduced: dict[str, Any] = field(default_factory=lambda: dict(REDUCED))
 
     def job(self, variant: str) -> JobConfig:
@@ -126,7 +116,6 @@ class Ablation(Study):
         ]
 
     def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:
-        """Counts, or one-step errors; the same commands for everybody."""
         options = self.options
         if cell.condition == HELD_OUT:
             return dict(agent.origin.held_out[cell.task])
@@ -144,11 +133,9 @@ class Ablation(Study):
         return counts(result)
 
     def more(self) -> dict[str, Any]:
-        """What every training changes of the main job."""
         return {"training": {name: changed(self.options.job(name)) for name in self.options.variants}}
 
     def table(self, results: Results) -> str:
-        """Per variant: success in every gait, velocity error, gait transitions, the changed world, and one-step R2."""
         gaits, rows = distinct(results.records, "task"), []
         for agent, members in group(results.records, "agent").items():
             per_gait = group([own for own in members if own["condition"] == DRAWN], "task")
@@ -163,7 +150,6 @@ class Ablation(Study):
         return markdown(header, rows)
 
     def figure(self, results: Results) -> Figure:
-        """A dot per variant and metric."""
         columns = {
             "success": "success",
             "error": "velocity error [m/s]",

@@ -14,7 +14,7 @@ from experiments.agents import Agent
 from experiments.results import Results
 from experiments.stats import Group, drops, group
 from experiments.student.episodes import counts
-from experiments.study import ALL_GAITS, Cell, Metrics, Study
+from experiments.study import ALL_GAITS, Cell, Metrics, Study, option
 from experiments.tables import markdown, number, percent
 from experiments.training_runs import collect, kept_policy, rows_of
 from go1_mtl_gym.errors import InvalidInputError
@@ -55,23 +55,24 @@ COLORS = (plots.RED, plots.YELLOW, plots.PURPLE, plots.GREEN, plots.BLUE)
 class BudgetOptions:
     """What all methods share.
 
-    Attributes:
-        job: observation, network, `clone_steps` of every training, shards and evaluation; its seed is not used.
-        budgets_s: labels per gait [s]; each twice the one before.
-        seeds: of the trainings.
-        noise_rad, round_noise_rad: largest action noise in perturbed demonstrations and in perturbed rounds [rad].
-
     Raises:
         InvalidInputError: if budgets do not double, or are no whole number of shards.
     """
 
-    job: JobConfig = JobConfig(
-        n_envs=1, randomized=0.0, task_interval=None, clone_steps=2500, episodes=10, episode_s=15.0
+    job: JobConfig = option(
+        JobConfig(n_envs=1, randomized=0.0, task_interval=None, clone_steps=2500, episodes=10, episode_s=15.0),
+        "observation, network, clone_steps of every training, shards and evaluation; its seed is not used",
     )
-    budgets_s: tuple[float, ...] = (15.0, 30.0, 60.0, 120.0, 240.0)
-    seeds: tuple[int, ...] = (0, 1)
-    noise_rad: float = NOISE_RAD
-    round_noise_rad: float = ROUND_NOISE_RAD
+    budgets_s: tuple[float, ...] = option(
+        (15.0, 30.0, 60.0, 120.0, 240.0), "labels per gait [s]; each twice the one before"
+    )
+    seeds: tuple[int, ...] = option((0, 1), "of the trainings")
+    noise_rad: float = option(
+        NOISE_RAD, "largest action noise in perturbed demonstrations and in perturbed rounds [rad]"
+    )
+    round_noise_rad: float = option(
+        ROUND_NOISE_RAD, "largest action noise in perturbed demonstrations and in perturbed rounds [rad]"
+    )
 
     def __post_init__(self) -> None:
         doubled = all(b == 2 * a for a, b in zip(self.budgets_s, self.budgets_s[1:]))
@@ -148,7 +149,6 @@ class Budget(Study):
         return records
 
     def table(self, results: Results) -> str:
-        """Per method: success and survival at every budget; error, falls and learner's fraction at the last; drops."""
         methods = _methods(results)
         budgets = [f"{labels_s:g} s" for labels_s in next(iter(methods.values()))]
         rows = []
@@ -164,7 +164,6 @@ class Budget(Study):
         return markdown(["", *budgets, *more], rows)
 
     def figure(self, results: Results) -> Figure:
-        """Survival and success over labels, and falls while collecting them, a color per method."""
         figure = plots.new_figure(9.6, 3.6)
         shares, falls = figure.subplots(1, 2)
         for color, (name, levels) in zip(COLORS, _methods(results).items()):

@@ -12,7 +12,7 @@ from experiments.results import Results, distinct
 from experiments.stats import Group, group
 from experiments.student.episodes import counts
 from experiments.student.phase import with_correction
-from experiments.study import Cell, Metrics, Study
+from experiments.study import Cell, Metrics, Study, option
 from experiments.tables import count, judged, markdown, number
 from experiments.training_runs import TrainedPolicy, TrainingRun, changed
 from trainers.pipeline.config import JobConfig
@@ -26,25 +26,16 @@ TARGETS = {"success_rate": 0.95, "velocity_error": 0.05, "error_ratio": 2.0}
 
 @dataclass(frozen=True)
 class CommandedOptions:
-    """Drawn commands, from a standing start.
+    """Drawn commands, from a standing start."""
 
-    Attributes:
-        seeds: of the trainings.
-        episodes, corner_episodes, phase_free_episodes: of each kind, per gait and policy.
-        seconds: duration of each [s].
-        command_interval: time between commands [s].
-        correction: of the clocks that are corrected, see `trainers.PhaseFreePolicy`.
-        job: of the trainings; its seed is not used.
-    """
-
-    seeds: tuple[int, ...] = (0, 1, 2, 3, 4)
-    episodes: int = 100
-    corner_episodes: int = 20
-    phase_free_episodes: int = 20
-    seconds: float = 30.0
-    command_interval: float = 5.0
-    correction: float = 0.5
-    job: JobConfig = JobConfig()
+    seeds: tuple[int, ...] = option((0, 1, 2, 3, 4), "of the trainings")
+    episodes: int = option(100, "of each kind, per gait and policy")
+    corner_episodes: int = option(20, "of each kind, per gait and policy")
+    phase_free_episodes: int = option(20, "of each kind, per gait and policy")
+    seconds: float = option(30.0, "duration of each [s]")
+    command_interval: float = option(5.0, "time between commands [s]")
+    correction: float = option(0.5, "of the clocks that are corrected, see trainers.PhaseFreePolicy")
+    job: JobConfig = option(JobConfig(), "of the trainings; its seed is not used")
 
 
 class Commanded(Study):
@@ -80,7 +71,6 @@ class Commanded(Study):
         return [Cell(task, condition) for task in self.options.job.tasks for condition in conditions]
 
     def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:
-        """Counts of one kind of commands; the same ones for everybody."""
         options, policy = self.options, agent.load()
         if cell.condition == CORRECTED:
             policy = with_correction(policy, options.correction)
@@ -98,11 +88,9 @@ class Commanded(Study):
         return counts(result)
 
     def more(self) -> dict[str, Any]:
-        """What the trainings change of the main job."""
         return {"targets": TARGETS, "training": changed(self.options.job)}
 
     def table(self, results: Results) -> str:
-        """Per gait, over the training seeds: success, velocity error beside the expert's, corners, without a clock."""
         rows = []
         for gait in distinct(results.records, "task"):
             seeds, expert = _seeds(results, gait), _members(results, gait, EXPERT, DRAWN)
@@ -127,7 +115,6 @@ class Commanded(Study):
         return markdown([*header, "worst ratio", "corners", "expert's", "without a clock", "own clock"], rows)
 
     def figure(self, results: Results) -> Figure:
-        """Per gait: success of all training seeds and of the worst, and velocity errors beside the expert's."""
         success: dict[str, dict[str, Any]] = {"all seeds": {}, "worst seed": {}}
         errors: dict[str, dict[str, float | None]] = {"all seeds": {}, "worst seed": {}, EXPERT: {}}
         for gait in distinct(results.records, "task"):

@@ -24,7 +24,7 @@ from experiments.student.phase import (
     without_asked,
 )
 from experiments.student.transitions import TransitionOptions
-from experiments.study import ALL_GAITS, Cell, Metrics, Study
+from experiments.study import ALL_GAITS, Cell, Metrics, Study, option
 from experiments.tables import count, markdown, number
 from experiments.training_runs import collect, kept_policy, rows_of
 from go1_mtl_gym.errors import InvalidInputError
@@ -76,27 +76,20 @@ VARIANTS = {
 class PhaseFreeOptions:
     """What all variants share.
 
-    Attributes:
-        job: rows, network, `clone_steps` of every training and evaluation; it records the channels of `CLOCKED` and as
-            many frames as any variant sees.
-        held_out_s: perturbed demonstrations that the phase's error is measured on, per gait [s].
-        noise_rad: largest action noise in perturbed demonstrations [rad].
-        transitions: changes of gait, for every ordered pair.
-        noisy_s: duration of the episodes with noisy sensors [s].
-        given_episodes: of finished policies that are measured too.
-        corrections: that these are measured with.
-
     Raises:
         InvalidInputError: if the job records less than the variants see.
     """
 
-    job: JobConfig = JobConfig(n_envs=1, history=FRAMES)
-    held_out_s: float = 30.0
-    noise_rad: float = NOISE_RAD
-    transitions: TransitionOptions = TransitionOptions(trials=3)
-    noisy_s: float = 10.0
-    given_episodes: int = 100
-    corrections: tuple[float, ...] = (1.0, 0.2)
+    job: JobConfig = option(
+        JobConfig(n_envs=1, history=FRAMES),
+        "rows, network, clone_steps of every training, and evaluation; it records all that any variant sees",
+    )
+    held_out_s: float = option(30.0, "perturbed demonstrations that the phase's error is measured on, per gait [s]")
+    noise_rad: float = option(NOISE_RAD, "largest action noise in perturbed demonstrations [rad]")
+    transitions: TransitionOptions = option(TransitionOptions(trials=3), "changes of gait, for every ordered pair")
+    noisy_s: float = option(10.0, "duration of the episodes with noisy sensors [s]")
+    given_episodes: int = option(100, "of finished policies that are measured too")
+    corrections: tuple[float, ...] = option((1.0, 0.2), "that these are measured with")
 
     def __post_init__(self) -> None:
         most = max(variant.history for variant in VARIANTS.values())
@@ -181,7 +174,6 @@ class PhaseFree(Study):
         collect([*self.options.training, *self.options.held_out], self.folder, n_jobs)
 
     def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:
-        """Train a variant, or take a finished policy, and measure how it walks and how well it knows the phase."""
         options = self.options
         if agent.name in VARIANTS:
             episodes, (policy, estimate) = options.job.episodes, Trainings(options, self.folder).policy(agent.name)
@@ -195,7 +187,6 @@ class PhaseFree(Study):
         return records
 
     def table(self, results: Results) -> str:
-        """Per policy: success in every gait, what all gaits have in common, and the error of the phase."""
         gaits = [task for task in distinct(results.records, "task") if task != ALL_GAITS]
         rows = []
         for agent, members in group(results.records, "agent").items():
@@ -212,7 +203,6 @@ class PhaseFree(Study):
         return markdown(["", *gaits, *more], rows)
 
     def figure(self, results: Results) -> Figure:
-        """Success while walking, with noisy sensors and in gait transitions; median and 99 % of the phase error."""
         agents = group(results.of(task=ALL_GAITS), ["condition", "agent"])
         success = {
             condition: {agent: own.rate() for (name, agent), own in agents.items() if name == condition}

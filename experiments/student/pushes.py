@@ -12,7 +12,7 @@ from experiments.pushing import CRUISE, DIRECTIONS, PAIRS, push_w, weaker
 from experiments.results import Results, distinct
 from experiments.searches import climb
 from experiments.stats import group
-from experiments.study import Cell, Metrics, Study
+from experiments.study import Cell, Metrics, Study, option
 from experiments.tables import markdown
 from go1_mtl_gym import TASKS
 from trainers.data.environments import derive_seed, make_env
@@ -24,25 +24,15 @@ STREAM = "kick"
 
 @dataclass(frozen=True)
 class PushOptions:
-    """The search for the largest push, from the smallest upward.
+    """The search for the largest push, from the smallest upward."""
 
-    Attributes:
-        trials: per size.
-        fraction: of the trials that must survive.
-        step: of the grid of sizes, and the smallest of them [m/s].
-        grid: largest number of sizes.
-        before_s: walking before the push [s]; a random part of the gait's period is added.
-        after_s: without a fall after it [s].
-        directions: which of `DIRECTIONS`.
-    """
-
-    trials: int = 20
-    fraction: float = 0.9
-    step: float = 0.2
-    grid: int = 25
-    before_s: float = 1.5
-    after_s: float = 3.0
-    directions: tuple[str, ...] = tuple(DIRECTIONS)
+    trials: int = option(20, "per size")
+    fraction: float = option(0.9, "of the trials that must survive")
+    step: float = option(0.2, "of the grid of sizes, and the smallest of them [m/s]")
+    grid: int = option(25, "largest number of sizes")
+    before_s: float = option(1.5, "walking before the push [s]; a random part of the gait's period is added")
+    after_s: float = option(3.0, "without a fall after it [s]")
+    directions: tuple[str, ...] = option(tuple(DIRECTIONS), "which of DIRECTIONS")
 
 
 class Pushes(Study):
@@ -92,7 +82,6 @@ class Pushes(Study):
         return {"largest": largest, "at_cap": largest == tried[-1][0], "tried": tried}
 
     def table(self, results: Results) -> str:
-        """Per gait and agent: largest push in every direction [m/s]."""
         rows = []
         for (gait, agent), members in group(results.records, ["task", "agent"]).items():
             own = {record["condition"]: f"{'>= ' * record['at_cap']}{record['largest']:.1f}" for record in members}
@@ -101,7 +90,6 @@ class Pushes(Study):
         return markdown(["gait", "", *(f"{name} [m/s]" for name in DIRECTIONS)], rows, text_columns=2)
 
     def figure(self, results: Results) -> Figure:
-        """Largest push per gait, in the weaker of the two directions."""
         panels: dict[str, dict[str, dict[str, float | None]]] = {}
         for (agent, gait), members in group(results.records, ["agent", "task"]).items():
             largest = {own["condition"]: own["largest"] for own in members}

@@ -11,9 +11,9 @@ import trainers
 from experiments import plots
 from experiments.agents import EXPERT, STUDENT, Agent, Expert, shipped, tasks_of, with_expert
 from experiments.results import Record, Results, distinct
-from experiments.stats import Group, group
+from experiments.stats import group
 from experiments.student.episodes import counts
-from experiments.study import Cell, Metrics, Study
+from experiments.study import Cell, Metrics, Study, option
 from experiments.tables import count, markdown
 from go1_mtl_gym.sensing.observation import SensorNoise
 from go1_mtl_gym.sensing.state_noise import EstimatorNoise
@@ -36,21 +36,13 @@ policy's sensors' or the expert's estimator's."""
 
 @dataclass(frozen=True)
 class RobustnessOptions:
-    """Drawn commands in a world that differs.
+    """Drawn commands in a world that differs."""
 
-    Attributes:
-        episodes: per gait and value.
-        seconds: duration of each [s].
-        command_interval: time between commands [s].
-        every: 1 for all values, 2 for the ends and the middle.
-        quantities: which of `QUANTITIES`.
-    """
-
-    episodes: int = 20
-    seconds: float = 10.0
-    command_interval: float = 5.0
-    every: int = 1
-    quantities: tuple[str, ...] = tuple(QUANTITIES)
+    episodes: int = option(20, "per gait and value")
+    seconds: float = option(10.0, "duration of each [s]")
+    command_interval: float = option(5.0, "time between commands [s]")
+    every: int = option(1, "1 for all values, 2 for the ends and the middle")
+    quantities: tuple[str, ...] = option(tuple(QUANTITIES), "which of QUANTITIES")
 
 
 class Robustness(Study):
@@ -74,7 +66,6 @@ class Robustness(Study):
         return [Cell(task, quantity) for task in tasks_of(agent) for quantity in self.options.quantities]
 
     def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:
-        """Counts at every value; the same commands at each."""
         options, policy = self.options, agent.load()
         levels = []
         for value in QUANTITIES[cell.condition][1][:: options.every]:
@@ -87,7 +78,6 @@ class Robustness(Study):
         return levels
 
     def table(self, results: Results) -> str:
-        """Per policy and quantity, in the middle of its range: survived and successful episodes of every gait."""
         gaits, rows = distinct(results.records, "task"), []
         for (agent, quantity), members in group(results.records, ["agent", "condition"]).items():
             if agent != EXPERT:
@@ -103,7 +93,6 @@ class Robustness(Study):
         return markdown(["", "quantity", "middle", *gaits], rows, text_columns=2)
 
     def figure(self, results: Results) -> Figure:
-        """Survival over each quantity: of all gaits together, with 95 % intervals, and, thin, of the weakest gait."""
         shown = [name for name in QUANTITIES if name in distinct(results.records, "condition")]
         columns = min(4, len(shown))
         rows = -(-len(shown) // columns)
@@ -147,8 +136,3 @@ def _survival(ax: Axes, records: Sequence[Record]) -> None:
     ax.set_xticks([*levels], [f"{value:g}" for value in levels])
     ax.axhline(TARGET, color="0.7", linewidth=0.8, linestyle=":", zorder=0)
     plots.shares(ax)
-
-
-def _weakest(level: Group) -> float:
-    """Survival of the weakest gait."""
-    return min(own.rate("survived").value for own in group(level, "task").values())

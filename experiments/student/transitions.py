@@ -10,22 +10,17 @@ from experiments.agents import STUDENT, Agent, shipped, tasks_of, with_expert
 from experiments.results import Results, distinct
 from experiments.stats import Rate, group
 from experiments.student.episodes import counts, other_gaits
-from experiments.study import Cell, Metrics, Study
+from experiments.study import Cell, Metrics, Study, option
 from experiments.tables import count, markdown
 
 
 @dataclass(frozen=True)
 class TransitionOptions:
-    """Changes of gait.
+    """Changes of gait."""
 
-    Attributes:
-        trials: per ordered pair of gaits.
-        before_s, after_s: walking in the first gait and in the second [s].
-    """
-
-    trials: int = 20
-    before_s: float = 2.0
-    after_s: float = 6.0
+    trials: int = option(20, "per ordered pair of gaits")
+    before_s: float = option(2.0, "walking in the first gait and in the second [s]")
+    after_s: float = option(6.0, "walking in the first gait and in the second [s]")
 
 
 class Transitions(Study):
@@ -50,11 +45,9 @@ class Transitions(Study):
         return [Cell(first, f"to {second}") for first in tasks for second in other_gaits(first, tasks)]
 
     def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:
-        """Counts of one pair."""
         return transition(agent, cell, self.options, seed)
 
     def table(self, results: Results) -> str:
-        """Per agent and first gait: successes to each second gait, and survivals of all together."""
         rates, rows = transition_rates(results), []
         gaits = gaits_of(rates)
         for agent in distinct(results.records, "agent"):
@@ -64,7 +57,6 @@ class Transitions(Study):
         return markdown(["", "from", *(f"to {gait}" for gait in gaits), "survived"], rows, text_columns=2)
 
     def figure(self, results: Results) -> Figure:
-        """One matrix per agent."""
         return plots.transition_figure(transition_rates(results), "successful gait transitions")
 
 

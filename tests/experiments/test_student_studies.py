@@ -333,17 +333,6 @@ def test_the_phase_is_asked_for_as_two_joints_that_are_cut_off_later():
     np.testing.assert_allclose(np.linalg.norm(phase.asked_phase(policy)(rows), axis=1), 1.0, atol=1e-6)
 
 
-def test_variants_see_what_their_names_say(tmp_path):
-    options = dataclasses.replace(phase_free.PhaseFree.quick, job=TINY_JOB)
-    trained = phase_free.Trainings(options, tmp_path)
-    literal, none = trained.policy("paper-literal")
-    frames, _ = trained.policy("ten frames")
-    assert none is None and literal.contract.channels == () and frames.contract.history == 10
-    two, estimate = trained.policy("two stages, clock with correction")
-    assert isinstance(two, trainers.PhaseFreePolicy) and two.correction == 0.2
-    assert estimate(rows_at(TURNS)).shape == (5, 2)
-
-
 def test_finished_policies_are_measured_with_each_correction_and_others_refused():
     study = phase_free.PhaseFree(phase_free.PhaseFree.full)
     assert [agent.name for agent in study.agents()][-2:] == ["phase_free, correction 1", "phase_free, correction 0.2"]

@@ -6,7 +6,7 @@ import pytest
 
 from go1_mtl_gym.errors import InvalidInputError
 from trainers import paper_table, results_table
-from trainers.utils.report import closed_loop_table, markdown, seconds_table
+from trainers.utils.report import markdown
 
 STUDENT = {
     "mse": 0.0012345,
@@ -84,13 +84,7 @@ def test_the_papers_numbers_stand_beside_ours():
     assert cells(paper_table({"tasks": {"pace": {}}}))[2] == ["pace", "-", "-", "-", "-", "-"]
 
 
-def test_closed_loop_alone():
-    table = cells(closed_loop_table({"trot": EXPERT | {"episodes": [{}] * 20}}))
-    assert table[2] == ["trot", "19/20", "20/20", "0.031", "0.051", "2.50"]
-
-
-def test_seconds_and_markdown():
-    assert seconds_table({"collect": 12.34}) == "| stage | wall time [s] |\n| :-- | --: |\n| collect | 12 |"
+def test_markdown():
     assert markdown(["a", "b"], [["c", "d"]], text_columns=2) == "| a | b |\n| :-- | :-- |\n| c | d |"
 
 
@@ -99,5 +93,3 @@ def test_metrics_without_tasks_are_refused(metrics):
     for table in (results_table, paper_table):
         with pytest.raises(InvalidInputError, match="at least one task"):
             table(metrics)
-    with pytest.raises(InvalidInputError, match="at least one task"):
-        closed_loop_table({})

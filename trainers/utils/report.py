@@ -24,13 +24,6 @@ RESULT_COLUMNS = {
     "steps/s": ("step_rate", ".2f"),
 }
 """Header -> key in ``metrics.json`` and how its value is written."""
-EXPERT_COLUMNS = {
-    "success": ("success_rate", "share"),
-    "survival": ("survival_rate", "share"),
-    "velocity error [m/s]": ("velocity_error", ".3f"),
-    "yaw rate error [rad/s]": ("yaw_rate_error", ".3f"),
-    "steps/s": ("step_rate", ".2f"),
-}
 PAPER_R2 = {
     "trot": (0.919537, 0.770130, "simulation"),
     "jump": (0.892613, 0.796875, "simulation"),
@@ -77,80 +70,6 @@ def paper_table(metrics: Mapping[str, Any]) -> str:
         rows.append([task, *ours, number(multi, ".4f"), number(single, ".4f"), where])
     header = ["gait", "multi-head, here", "pooled, here", "multi-task, paper", "single-task, paper", "paper's setting"]
     return markdown(header, rows, text_columns=1)
-
-
-def closed_loop_table(results: Mapping[str, Mapping[str, Any]]) -> str:
-    """One row per task of closed-loop figures alone.
-
-    Args:
-        results: task -> what `trainers.ClosedLoopResult.as_dict` gives.
-
-    Raises:
-        InvalidInputError: if there are no tasks in it.
-    """
-    if not results:
-        raise InvalidInputError("expected results of at least one task, got none")
-    rows = [[task, *(_cell(own, key, how) for key, how in EXPERT_COLUMNS.values())] for task, own in results.items()]
-    return markdown(["gait", *EXPERT_COLUMNS], rows, text_columns=1)
-
-
-def seconds_table(seconds: Mapping[str, float]) -> str:
-    """One row per stage of a run and its wall time."""
-    rows = [[stage, f"{value:.0f}"] for stage, value in seconds.items()]
-    return markdown(["stage", "wall time [s]"], rows, text_columns=1)
-
-
-def benchmark_table(result: Mapping[str, Any]) -> str:
-    """One row per thing timed and contestant of ``benchmarks/expert.py``.
-
-    Args:
-        result: {"scopes": {scope: meaning}, "times_ms": {contestant: {scope: {"median", "p99"}}}, "ratio_to_ours":
-            {contestant: {scope: ratio}}}.
-    """
-    rows = []
-    for scope, meaning in result["scopes"].items():
-        for name, own in result["times_ms"].items():
-            if scope in own:
-                times = [f"{own[scope][quantile]:.2f}" for quantile in ("median", "p99")]
-                rows.append([meaning, name, *times, f"{result['ratio_to_ours'][name][scope]:.2f}"])
-    header = ["timed", "contestant", "median [ms]", "p99 [ms]", "in units of ours"]
-    return markdown(header, rows, text_columns=2)
-
-
-def training_table(result: Mapping[str, Any]) -> str:
-    """One table per section of ``benchmarks/training.py``: rates, and how they compare within each round.
-
-    Args:
-        result: {"sections": {name: {"meaning": text, "rows": [{"setting", "contestant", "figures": {figure: spread},
-            "over": {reference: {figure: spread}}}]}}}; a spread is {"median", "low", "high"}.
-
-    Raises:
-        InvalidInputError: if there are no sections in it.
-    """
-    sections = result.get("sections")
-    if not sections:
-        raise InvalidInputError(f'expected results with at least one section under "sections", got {sorted(result)}')
-    return "\n\n".join(f"**{own['meaning']}**\n\n{_section_table(own['rows'])}" for own in sections.values())
-
-
-def _section_table(rows: Sequence[Mapping[str, Any]]) -> str:
-    references = list(dict.fromkeys(name for row in rows for name in row["over"]))
-    others = list(dict.fromkeys(figure for row in rows for figure in row["figures"] if figure != "samples_per_s"))
-    cells = []
-    for row in rows:
-        ratios = [_spread(row["over"].get(name, {}).get("samples_per_s")) for name in references]
-        figures = [_spread(row["figures"].get(figure), ".2e") for figure in others]
-        rate = f"{row['figures']['samples_per_s']['median']:.0f}"
-        cells.append([row["setting"], row["contestant"], rate, *ratios, *figures])
-    header = ["setting", "contestant", "samples/s", *(f"x {name}" for name in references), *others]
-    return markdown(header, cells, text_columns=2)
-
-
-def _spread(spread: Mapping[str, float] | None, how: str = ".2f") -> str:
-    """Median and quartiles, "-" without."""
-    if spread is None:
-        return "-"
-    return f"{spread['median']:{how}} ({spread['low']:{how}} ... {spread['high']:{how}})"
 
 
 def markdown(header: Sequence[str], rows: Sequence[Sequence[str]], text_columns: int = 1) -> str:
