@@ -21,6 +21,7 @@ STUDIES = {
     "student_pushes": "experiments.student.pushes:Pushes",
     "student_ablation": "experiments.student.ablation:Ablation",
     "student_budget": "experiments.student.budget:Budget",
+    "student_ppo": "experiments.student.ppo:ReinforcementLearning",
     "student_phase_free": "experiments.student.phase_free:PhaseFree",
     "paper_simulation": "experiments.paper.study:Simulation",
     "paper_hardware": "experiments.paper.study:Hardware",

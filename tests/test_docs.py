@@ -13,6 +13,7 @@ import experts
 import go1_mtl_gym
 import trainers
 from docs._ext.tables import TABLES, described, markdown
+from experiments.catalog import STUDIES
 from experts import MPCConfig
 from go1_mtl_gym import EnvConfig, PhysicsParams, episode, gaits
 from trainers.evaluation import scoring
@@ -86,6 +87,13 @@ def test_names_of_the_version_before_work_as_the_page_on_migrating_says(use_old_
     sys.modules.pop("experts.phase", None)  # it warns when it is imported
     with pytest.warns(DeprecationWarning):
         assert use_old_name() is not None
+
+
+def test_named_studies_exist():
+    lines = "\n".join(COMMANDS)
+    named = set(re.findall(r"\b(?:experiments run|study) ([a-z]\w+)", lines))
+    assert len(named) > 5
+    assert named <= set(STUDIES)
 
 
 def test_make_targets_exist():

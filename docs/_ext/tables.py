@@ -129,9 +129,12 @@ def actions() -> str:
 def _layout_table(layout: ObservationLayout) -> str:
     rows = []
     for name, where in layout.slices.items():
-        size, span = where.stop - where.start, f"{where.start} ... {where.stop - 1}"
-        rows.append((f"`{name}`", span, size, _unit(name), CONTENT[name]))
-    return markdown(("part", "entries", "size", "unit", "content"), rows)
+        size, span = where.stop - where.start, f"`{where.start}:{where.stop}`"
+        low, high = layout.low[where], layout.high[where]
+        largest = ", ".join(f"{value:.4g}" for value in sorted(set(high.tolist()), reverse=True))
+        bounds = f"± {largest}" if (low == -high).all() else f"0 ... {largest}"
+        rows.append((f"`{name}`", span, size, _unit(name), bounds, CONTENT[name]))
+    return markdown(("part", "slice", "size", "unit", "bounds", "content"), rows)
 
 
 def default_observation() -> str:
