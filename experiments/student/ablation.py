@@ -13,7 +13,7 @@ from experiments.stats import Group, group
 from experiments.student.commanded import DRAWN
 from experiments.student.episodes import counts, other_gaits
 from experiments.student.transitions import TransitionOptions, transition
-from experiments.study import Cell, Metrics, Study, option
+from experiments.study import EVALUATION_CODE, Cell, Metrics, Study, option
 from experiments.tables import count, mean, settings, share, table
 from experiments.training_runs import TrainedPolicy, TrainingRun, changed
 from trainers.pipeline.config import JobConfig
@@ -101,7 +101,7 @@ class Ablation(Study):
         transitions=TransitionOptions(1, 0.5, 2.5),
         reduced=PRESETS["smoke"] | {"tasks": ("trot", "bound"), "phase_free_s": 0.0, "round_episodes": 1},
     )
-    code = (*Study.code, "experiments.student.transitions", "experiments.training_runs")
+    code = (*EVALUATION_CODE, "experiments.student.transitions", "experiments.training_runs")
 
     def agents(self) -> list[Agent]:
         runs = {name: TrainingRun(self.options.job(name), self.cache / "training") for name in self.options.variants}

@@ -12,7 +12,7 @@ from experiments.pushing import CRUISE, DIRECTIONS, PAIRS, push_w, weaker
 from experiments.results import Results, distinct
 from experiments.searches import climb
 from experiments.stats import Group, group
-from experiments.study import Cell, Metrics, Study, option
+from experiments.study import EVALUATION_CODE, Cell, Metrics, Study, option
 from experiments.tables import Column, table
 from go1_mtl_gym import TASKS
 from trainers.data.environments import derive_seed, make_env
@@ -47,7 +47,7 @@ class Pushes(Study):
     caption = "Largest push survived, of student and expert"
     full = PushOptions()
     quick = PushOptions(1, grid=1, before_s=0.5, after_s=0.5)
-    code = (*Study.code, "experiments.pushing", "experiments.searches")
+    code = (*EVALUATION_CODE, "experiments.pushing", "experiments.searches")
     takes_policies = True
 
     def agents(self) -> list[Agent]:

@@ -13,7 +13,7 @@ from experiments.agents import EXPERT, STUDENT, Agent, Expert, shipped, tasks_of
 from experiments.results import Record, Results, distinct
 from experiments.stats import group
 from experiments.student.episodes import counts
-from experiments.study import Cell, Metrics, Study, option
+from experiments.study import EVALUATION_CODE, Cell, Metrics, Study, option
 from experiments.tables import Column, share, table
 from go1_mtl_gym.sensing.observation import SensorNoise
 from go1_mtl_gym.sensing.state_noise import EstimatorNoise
@@ -57,6 +57,7 @@ class Robustness(Study):
     caption = "Survival over friction, payload, delay, motors, contacts and noise, of student and expert"
     full = RobustnessOptions()
     quick = RobustnessOptions(1, 2.5, 1.5, every=4)
+    code = EVALUATION_CODE
     takes_policies = True
 
     def agents(self) -> list[Agent]:

@@ -10,7 +10,7 @@ from experiments.agents import STUDENT, Agent, shipped, tasks_of, with_expert
 from experiments.results import Results, distinct
 from experiments.stats import Rate, group
 from experiments.student.episodes import counts, other_gaits
-from experiments.study import Cell, Metrics, Study, option
+from experiments.study import EVALUATION_CODE, Cell, Metrics, Study, option
 from experiments.tables import share, table
 
 
@@ -35,6 +35,7 @@ class Transitions(Study):
     caption = "Successful gait transitions, of student and expert"
     full = TransitionOptions()
     quick = TransitionOptions(1, 0.5, 3.0)
+    code = EVALUATION_CODE
     takes_policies = True
 
     def agents(self) -> list[Agent]:
