@@ -142,14 +142,6 @@ def test_no_two_shards_share_a_seed():
     assert len(set(names)) == len(names) == 2 * 3 * (20 + 1 + 10)
 
 
-@pytest.mark.parametrize(
-    "change", [{"widths": ()}, {"seeds": (1, 1)}, {"precision": "a"}, {"kinds": ("a",)}, {"gap": -1}]
-)
-def test_impossible_settings_are_refused(change):
-    with pytest.raises(InvalidInputError):
-        settings.PaperOptions(**change)
-
-
 def test_a_network_is_measured_on_what_was_held_out(slow):
     (agent,) = [own for own in slow.agents() if own.name == "multi_head"]
     (cell,) = slow.cells(agent)
@@ -330,27 +322,6 @@ def test_ratios_are_taken_within_rounds():
     assert slow["agent"] == "slow" and slow["over"] == {}
 
 
-def test_the_stopwatch_leaves_out_the_first_steps(monkeypatch):
-    now = itertools.count()
-    monkeypatch.setattr(turns.time, "perf_counter", lambda: 4.0 * next(now))
-    watch = turns.Stopwatch(QUICK)
-    for _ in range(turns.WARM_UP + 6):
-        watch()
-    assert watch.rate(10) == pytest.approx(6 * 10 / 4.0)
-
-
-def test_a_heat_sets_threads_and_gives_them_back():
-    before, seen = torch.get_num_threads(), []
-
-    def contestants(folder):
-        assert folder.is_dir()
-        return {"only": lambda i: {"samples_per_s": float(seen.append(torch.get_num_threads()) is None)}}
-
-    records = turns.run(turns.Heat("2 threads", 2, contestants, ()), 2)
-    assert seen == [2, 2] and torch.get_num_threads() == before
-    assert [own["condition"] for own in records] == ["2 threads"]
-
-
 def test_the_bare_loop_does_the_same_arithmetic():
     data = loops.made_up(2000, 4, seed=0, episode=10)
     config = BCConfig(steps=20, batch_size=64, max_grad_norm=0.05)
@@ -379,12 +350,6 @@ def test_the_walk_without_the_expert_is_the_experts():
 
     rows._replay(Recorder(), walked, seed=3)
     np.testing.assert_array_equal(np.array(seen[:-1]), walked.obs)
-
-
-@pytest.mark.parametrize("wrong", [{"rounds": 0}, {"batch_size": 6}, {"rows": 10}, {"device": "tpu"}])
-def test_impossible_amounts_are_refused(wrong):
-    with pytest.raises(InvalidInputError):
-        turns.TrainingOptions(**wrong)
 
 
 def test_exact_solvers_agree_and_ours_is_timed_from_the_inside_out():

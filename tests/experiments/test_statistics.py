@@ -4,7 +4,6 @@ import math
 
 import pytest
 
-from experiments import plots
 from experiments.searches import climb, climb_from, scouted
 from experiments.stats import Group, Rate, drops, estimate, group
 from experiments.tables import count, estimated, judged, spans
@@ -93,13 +92,3 @@ def test_what_misses_its_target_is_bold():
     assert judged(0.9, 0.95, "higher", ".0%") == "**90%**" and judged(None, 0.05, "lower", ".2f") == "**-**"
     assert estimated(estimate([1.0]), ".1f") == "1.0" and spans(None) == "-"
     assert spans([1.0, 2.0, 3.0]) == "2.00 (1.00 ... 3.00)"
-
-
-def test_a_long_legend_is_broken_into_lines():
-    figure = plots.new_figure(4.0, 3.0)
-    ax = figure.subplots()
-    for i in range(6):
-        ax.plot([0, 1], [i, i], label=f"a policy with a long name, number {i}")
-    plots.legend(figure, [ax])
-    shown = figure.legends[0]
-    assert len(shown.get_texts()) == 6 and shown._ncols < 6 and len(figure.legends) == 1

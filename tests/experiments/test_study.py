@@ -156,11 +156,6 @@ def test_agents_of_one_origin_are_made_once_and_before_they_are_measured(study, 
     assert (tmp_path / "made").read_text() == "x" and results.seconds["training"] == 2.5
 
 
-def test_a_name_that_is_no_module_is_refused():
-    with pytest.raises(InvalidInputError, match="no_such_module"):
-        frame.sources("no_such_module")
-
-
 def test_results_are_written_with_one_record_a_line_and_read_again(study, tmp_path):
     results = run(study, 3)
     results.write(tmp_path / "noted.json")
