@@ -42,6 +42,10 @@ class Estimate(NamedTuple):
 class Group(tuple[Record, ...]):
     """Some records, taken together."""
 
+    def where(self, **values: Any) -> "Group":
+        """The records that have these values."""
+        return Group(record for record in self if all(record.get(name) == value for name, value in values.items()))
+
     def total(self, key: str) -> int:
         """Sum over the records that have it."""
         return sum(record[key] for record in self if record.get(key) is not None)

@@ -35,6 +35,18 @@ CACHE = Path("runs/experiments")
 """Where finished cells, demonstrations and policies are kept."""
 ALL_GAITS = "all gaits"
 """Stands for the task where all of an agent's gaits are measured together."""
+EVALUATION_CODE = (
+    "go1_mtl_gym",
+    "experts",
+    "trainers.data",
+    "trainers.policies",
+    "trainers.evaluation",
+    "experiments.agents",
+    "experiments.student.episodes",
+)
+"""What the metrics of a finished policy or of the expert depend on."""
+TRAINING_CODE = (*EVALUATION_CODE, "trainers.algorithms", "trainers.pipeline")
+"""What a policy that a study trains depends on as well."""
 Metrics = dict[str, Any] | list[dict[str, Any]]
 """What a cell gives: the metrics of one record, or of several, each of which may name another task or condition."""
 
@@ -83,7 +95,7 @@ class Study(abc.ABC):
     full: ClassVar[Any]
     quick: ClassVar[Any]
     """Options of a whole run, and of one that measures everything and nothing well."""
-    code: ClassVar[tuple[str, ...]] = ("go1_mtl_gym", "experts", "trainers", "experiments.agents")
+    code: ClassVar[tuple[str, ...]] = TRAINING_CODE
     """Packages and modules beside the study's own whose code a cell depends on."""
     alone: ClassVar[bool] = False
     """Whether nothing else may run meanwhile, because time is measured."""
@@ -157,7 +169,7 @@ class Study(abc.ABC):
         return self.cache / self.name / f"{stem}-{self._digest(*words)}.json"
 
     def _digest(self, *words: str) -> str:
-        return digest((*words, _code((type(self).__module__, *self.code)), repr(versions())))
+        return digest((*words, code_digest((type(self).__module__, *self.code)), repr(versions())))
 
 
 def digest(words: Iterable[str]) -> str:
@@ -185,7 +197,8 @@ def sources(name: str) -> str:
 
 
 @cache
-def _code(names: tuple[str, ...]) -> str:
+def code_digest(names: tuple[str, ...]) -> str:
+    """A digest of the `sources` of some modules and packages."""
     return digest(map(sources, names))
 
 

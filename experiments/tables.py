@@ -1,13 +1,18 @@
 """Cells and tables in Markdown."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
-from experiments.stats import Estimate, Rate
+from experiments.stats import Estimate, Group, Rate
 from go1_mtl_gym.validation import one_of
 from trainers.utils.report import markdown, number
 
-__all__ = ["count", "estimated", "judged", "markdown", "number", "percent", "settings", "spans"]
+__all__ = [
+    "count", "estimated", "judged", "markdown", "mean", "number", "percent", "settings", "share", "spans", "table",
+]  # fmt: skip
+Column = Callable[[Group], str]
+"""Writes the cell of some records."""
 
 
 def count(rate: Rate, target: float = 0.0) -> str:
@@ -16,6 +21,29 @@ def count(rate: Rate, target: float = 0.0) -> str:
         return "-"
     text = f"{rate.successes}/{rate.trials}"
     return text if rate.successes >= target * rate.trials - 1e-9 else f"**{text}**"
+
+
+def table(groups: Mapping[Any, Group], labels: Sequence[str], columns: Mapping[str, Column]) -> str:
+    """One row per group.
+
+    Args:
+        groups: key, or tuple of keys, -> records; the keys stand first.
+        labels: headers of the keys.
+        columns: header -> what writes a group's cell.
+    """
+    keys = {key: key if isinstance(key, tuple) else (key,) for key in groups}
+    rows = [[*map(str, keys[key]), *(cell(own) for cell in columns.values())] for key, own in groups.items()]
+    return markdown([*labels, *columns], rows, text_columns=len(labels))
+
+
+def share(key: str = "succeeded", target: float = 0.0, **where: Any) -> Column:
+    """A column of `count` of the records that have some values."""
+    return lambda members: count(members.where(**where).rate(key), target)
+
+
+def mean(key: str, how: str, **where: Any) -> Column:
+    """A column of means of the records that have some values; "-" where there is none."""
+    return lambda members: number(members.where(**where).mean(key), how)
 
 
 def percent(rate: Rate) -> str:

@@ -10,10 +10,11 @@ from typing import Any
 
 import trainers
 from experiments.agents import PolicyFile
-from experiments.study import digest
+from experiments.study import TRAINING_CODE, code_digest, digest
 from trainers.algorithms.optimizer import torch_threads
 from trainers.pipeline.config import JobConfig
 from trainers.pipeline.job import Job
+from trainers.policies.checkpoint import versions
 from trainers.utils.files import write_json
 
 UNUSED = ("preset", "n_envs", "device", "threads", "episodes", "video_s")
@@ -26,8 +27,8 @@ HELD_OUT = "held_out.json"
 class TrainingRun:
     """The main job without baselines, evaluation and pictures, on one thread of one process.
 
-    Its folder's name stands for its settings: made again, it is read; interrupted, it goes on. Bars and messages go to
-    ``progress.log``. A main job with equal settings on one thread gives an equal policy.
+    Its folder's name stands for its settings and the code: made again, it is read; interrupted, it goes on. Bars and
+    messages go to ``progress.log``. A main job with equal settings on one thread gives an equal policy.
 
     Attributes:
         config: of the main job; `UNUSED` settings are ignored.
@@ -39,9 +40,10 @@ class TrainingRun:
 
     @property
     def folder(self) -> Path:
-        """Named by the seed, and by all settings but the `UNUSED`."""
+        """Named by the seed, all settings but the `UNUSED`, the code and the versions."""
         used = {name: value for name, value in dataclasses.asdict(self.config).items() if name not in UNUSED}
-        return self.root / f"seed-{self.config.seed}-{digest([repr(sorted(used.items()))])}"
+        words = (repr(sorted(used.items())), code_digest(TRAINING_CODE), repr(versions()))
+        return self.root / f"seed-{self.config.seed}-{digest(words)}"
 
     @property
     def policy(self) -> Path:

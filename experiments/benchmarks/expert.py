@@ -15,7 +15,7 @@ from experiments.pushing import CRUISE
 from experiments.results import Results
 from experiments.stats import group
 from experiments.study import Cell, Metrics, Study, option
-from experiments.tables import markdown
+from experiments.tables import mean, table
 from experts import MPCConfig, NMPCConfig, NMPCExpert
 from go1_mtl_gym import TASKS, Go1Env, Go1Error
 from go1_mtl_gym.sensing.state import RobotState
@@ -106,12 +106,17 @@ class ExpertBenchmark(Study):
         return super().published_options() | {"go2_convex_mpc": checkout}
 
     def table(self, results: Results) -> str:
-        scopes, rows = group(results.records, "condition"), []
-        for scope, meaning in SCOPES.items():
-            for own in scopes.get(scope, ()):
-                times = [f"{own[key]:.2f}" for key in ("median_ms", "p99_ms", "ratio")]
-                rows.append([meaning, own["agent"], *times])
-        return markdown(["timed", "agent", "median [ms]", "p99 [ms]", "in units of ours"], rows, text_columns=2)
+        columns = {
+            "median [ms]": mean("median_ms", ".2f"),
+            "p99 [ms]": mean("p99_ms", ".2f"),
+            "in units of ours": mean("ratio", ".2f"),
+        }
+        groups = {
+            (meaning, agent): own
+            for scope, meaning in SCOPES.items()
+            for agent, own in group(results.of(condition=scope), "agent").items()
+        }
+        return table(groups, ["timed", "agent"], columns)
 
 
 def walk(task: str, count: int, seed: int) -> Iterator[RobotState]:

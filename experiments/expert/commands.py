@@ -10,7 +10,7 @@ from experiments.expert.lab import ExpertOptions, ExpertStudy, Lab
 from experiments.results import Results
 from experiments.stats import Group, group
 from experiments.study import option
-from experiments.tables import count, markdown, number
+from experiments.tables import mean, share, table
 
 ONE, CHANGING = "one command", "new commands"
 
@@ -66,17 +66,10 @@ def episode(record: Any) -> dict[str, Any]:
 def closed_loop_table(gaits: Mapping[str, Group]) -> str:
     """One row per gait."""
     columns = {
-        "velocity error [m/s]": ("velocity_error", ".3f"),
-        "yaw rate error [rad/s]": ("yaw_rate_error", ".3f"),
-        "steps/s": ("step_rate", ".2f"),
+        "success": share(),
+        "survival": share("survived"),
+        "velocity error [m/s]": mean("velocity_error", ".3f"),
+        "yaw rate error [rad/s]": mean("yaw_rate_error", ".3f"),
+        "steps/s": mean("step_rate", ".2f"),
     }
-    rows = [
-        [
-            gait,
-            count(own.rate()),
-            count(own.rate("survived")),
-            *(number(own.mean(k), how) for k, how in columns.values()),
-        ]
-        for gait, own in gaits.items()
-    ]
-    return markdown(["gait", "success", "survival", *columns], rows)
+    return table(gaits, ["gait"], columns)

@@ -7,8 +7,9 @@ import numpy as np
 
 from experiments.expert.lab import ExpertOptions, ExpertStudy, Lab, generator
 from experiments.results import Results
+from experiments.stats import group
 from experiments.study import option
-from experiments.tables import markdown
+from experiments.tables import mean, table
 from experts import NMPCExpert
 from experts.phase_fitting import fit_phase
 from experts.robot_model import RobotModel
@@ -39,13 +40,16 @@ class Labels(ExpertStudy):
         return [labels(lab, task, self.options, seed)]
 
     def table(self, results: Results) -> str:
-        rows = []
-        for own in results.records:
-            counts = [str(own[name]) for name in ("states", "asked_again")]
-            others = [f"{own[name]:.3f}" for name in ("wrong_clock", "fitted_clock", "phase_error", "phase_error_p95")]
-            rows.append([own["task"], *counts, f"{own['displaced']:.0e}", *others])
-        header = ["gait", "states", "other bits when asked again", "moved and turned [rad]", "clock wrong by 1/4 [rad]"]
-        return markdown([*header, "then fitted [rad]", "error of the fitted clock [cycles]", "95 %"], rows)
+        columns = {
+            "states": mean("states", ".0f"),
+            "other bits when asked again": mean("asked_again", ".0f"),
+            "moved and turned [rad]": mean("displaced", ".0e"),
+            "clock wrong by 1/4 [rad]": mean("wrong_clock", ".3f"),
+            "then fitted [rad]": mean("fitted_clock", ".3f"),
+            "error of the fitted clock [cycles]": mean("phase_error", ".3f"),
+            "95 %": mean("phase_error_p95", ".3f"),
+        }
+        return table(group(results.records, "task"), ["gait"], columns)
 
 
 def labels(lab: Lab, task: str, options: LabelOptions, seed: int) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from experiments.results import Results
 from experiments.searches import climb_from, scouted
 from experiments.stats import group
 from experiments.study import option
-from experiments.tables import markdown, number
+from experiments.tables import mean, table
 from go1_mtl_gym import TASKS
 from trainers.data.environments import derive_seed
 
@@ -88,20 +88,13 @@ class Limits(ExpertStudy):
         return {"survived_to": level, "tracked_to": tracked, **means, "at_cap": at_cap}
 
     def table(self, results: Results) -> str:
-        rows = []
-        for own in results.records:
-            errors = [number(own[name], ".3f") for name in ("velocity_error", "yaw_rate_error")]
-            survived = f"{own['survived_to']:g}{' (end of the search)' if own['at_cap'] else ''}"
-            rows.append([own["task"], own["condition"], survived, *errors, f"{own['tracked_to']:g}"])
-        header = [
-            "gait",
-            "axis",
-            "survived",
-            "velocity error there [m/s]",
-            "yaw rate error there [rad/s]",
-            "and tracked",
-        ]
-        return markdown(header, rows, text_columns=2)
+        columns = {
+            "survived": lambda own: mean("survived_to", "g")(own) + " (end of the search)" * own[0]["at_cap"],
+            "velocity error there [m/s]": mean("velocity_error", ".3f"),
+            "yaw rate error there [rad/s]": mean("yaw_rate_error", ".3f"),
+            "and tracked": mean("tracked_to", "g"),
+        }
+        return table(group(results.records, ["task", "condition"]), ["gait", "axis"], columns)
 
     def figure(self, results: Results) -> Figure:
         titles = {"vx": "forward [m/s]", "-vx": "backward [m/s]", "vy": "sideways [m/s]", "yaw": "yaw rate [rad/s]"}
@@ -163,11 +156,8 @@ class Pushes(ExpertStudy):
         return [{"condition": direction, "largest": largest} for direction, largest in found.items()]
 
     def table(self, results: Results) -> str:
-        rows = []
-        for gait, members in group(results.records, "task").items():
-            largest = {own["condition"]: own["largest"] for own in members}
-            rows.append([gait, *(number(largest.get(name), ".1f") for name in DIRECTIONS)])
-        return markdown(["gait", *(f"{name} [m/s]" for name in DIRECTIONS)], rows)
+        columns = {f"{name} [m/s]": mean("largest", ".1f", condition=name) for name in DIRECTIONS}
+        return table(group(results.records, "task"), ["gait"], columns)
 
     def figure(self, results: Results) -> Figure:
         directions = group(results.records, "condition").items()

@@ -12,8 +12,9 @@ from experiments import plots
 from experiments.expert.lab import ExpertOptions, ExpertStudy, Lab, generator
 from experiments.pushing import CRUISE
 from experiments.results import Record, Results
+from experiments.stats import group
 from experiments.study import option
-from experiments.tables import markdown, number
+from experiments.tables import mean, table
 from go1_mtl_gym import TASKS, Gait, robot
 from go1_mtl_gym.actuation import PHYSICS_HZ
 from go1_mtl_gym.gaits import next_phase
@@ -32,17 +33,19 @@ class SteadyOptions(ExpertOptions):
 
 
 COLUMNS = {
-    "contact as planned": ("contact_agreement", ".3f"),
-    "touchdown lag [s]": ("touchdown_lag_s", ".3f"),
-    "flight": ("flight_fraction", ".3f"),
-    "planned": ("planned_flight_fraction", ".3f"),
-    "torque at limit": ("saturated_fraction", ".4f"),
-    "cost of transport": ("cost_of_transport", ".2f"),
-    "height [m]": ("height", ".3f"),
-    "RMS velocity error [m/s]": ("rms_velocity_error", ".3f"),
-    "QP iterations": ("qp_iterations", ".0f"),
+    "command": lambda own: " ".join(f"{value:.2f}" for value in own[0]["command"]),
+    "contact as planned": mean("contact_agreement", ".3f"),
+    "touchdown lag [s]": mean("touchdown_lag_s", ".3f"),
+    "flight": mean("flight_fraction", ".3f"),
+    "planned": mean("planned_flight_fraction", ".3f"),
+    "torque at limit": mean("saturated_fraction", ".4f"),
+    "cost of transport": mean("cost_of_transport", ".2f"),
+    "height [m]": mean("height", ".3f"),
+    "RMS velocity error [m/s]": mean("rms_velocity_error", ".3f"),
+    "QP iterations": mean("qp_iterations", ".0f"),
+    "roll from, to [deg]": lambda own: " ".join(f"{value:.1f}" for value in own[0].get("roll_deg", ())) or "-",
+    "pitch from, to [deg]": lambda own: " ".join(f"{value:.1f}" for value in own[0].get("pitch_deg", ())) or "-",
 }
-"""Header -> metric and how it is written."""
 
 
 class Steady(ExpertStudy):
@@ -62,14 +65,7 @@ class Steady(ExpertStudy):
         ]
 
     def table(self, results: Results) -> str:
-        rows = []
-        for own in results.records:
-            command = " ".join(f"{value:.2f}" for value in own["command"])
-            ranges = [" ".join(f"{v:.1f}" for v in own.get(key, ())) or "-" for key in ("roll_deg", "pitch_deg")]
-            metrics = [number(own.get(key), how) for key, how in COLUMNS.values()]
-            rows.append([own["task"], own["condition"], command, *metrics, *ranges])
-        header = ["gait", "walk", "command", *COLUMNS, "roll from, to [deg]", "pitch from, to [deg]"]
-        return markdown(header, rows, text_columns=3)
+        return table(group(results.records, ["task", "condition"]), ["gait", "walk"], COLUMNS)
 
     def figure(self, results: Results) -> Figure:
         known = [own for own in results.records if "schedule" in own]

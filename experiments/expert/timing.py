@@ -14,9 +14,9 @@ from experiments.expert.lab import ExpertOptions, ExpertStudy, Lab
 from experiments.expert.limits import PushOptions, largest_push
 from experiments.pushing import CRUISE
 from experiments.results import Results
-from experiments.stats import Group, group
+from experiments.stats import group
 from experiments.study import option
-from experiments.tables import count, markdown, number
+from experiments.tables import markdown, mean, share, table
 from experts import NMPCConfig, NMPCExpert
 from experts.nmpc import WHOLE_BODY
 from go1_mtl_gym.actuation import PHYSICS_HZ
@@ -220,16 +220,11 @@ class Settings(ExpertStudy):
         raise NotImplementedError
 
     def table(self, results: Results) -> str:
-        rows = []
-        for (task, agent), own in sorted_by_task(results):
-            values = [number(own.mean("velocity_error"), ".3f"), number(own.mean("lateral_push"), ".1f")]
-            rows.append([task, agent, count(own.rate("survived")), *values])
-        header = ["gait", "settings", "survived", "velocity error [m/s]", "push to the side [m/s]"]
-        return markdown(header, rows, text_columns=2)
-
-
-def sorted_by_task(results: Results) -> list[tuple[tuple[str, str], Group]]:
-    """((task, agent), records), the tasks one after the other."""
-    found = group(results.records, ["task", "agent"])
-    tasks = list(dict.fromkeys(task for task, _ in found))
-    return sorted(found.items(), key=lambda item: tasks.index(item[0][0]))
+        columns = {
+            "survived": share("survived"),
+            "velocity error [m/s]": mean("velocity_error", ".3f"),
+            "push to the side [m/s]": mean("lateral_push", ".1f"),
+        }
+        tasks = list(group(results.records, "task"))
+        records = sorted(results.records, key=lambda own: tasks.index(own["task"]))
+        return table(group(records, ["task", "agent"]), ["gait", "settings"], columns)

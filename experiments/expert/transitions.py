@@ -12,7 +12,7 @@ from experiments.results import Results
 from experiments.stats import group
 from experiments.student.transitions import transition_rates
 from experiments.study import option
-from experiments.tables import count, markdown
+from experiments.tables import mean, share, table
 from go1_mtl_gym import TASKS
 
 
@@ -51,8 +51,7 @@ class Transitions(ExpertStudy):
         return records
 
     def table(self, results: Results) -> str:
-        rows = [[gait, count(own.rate("survived"))] for gait, own in group(results.records, "task").items()]
-        return markdown(["from", "survived"], rows)
+        return table(group(results.records, "task"), ["from"], {"survived": share("survived")})
 
     def figure(self, results: Results) -> Figure:
         return plots.transition_figure(transition_rates(results, "survived"), "survived gait transitions")
@@ -99,6 +98,11 @@ class LongWalk(ExpertStudy):
         return [{"steps": steps, "transitions": transitions, "pushes": pushes, "falls": falls}]
 
     def table(self, results: Results) -> str:
-        names = ("steps", "transitions", "pushes", "falls")
-        rows = [[own["task"], *(str(own[name]) for name in names)] for own in results.records if "steps" in own]
-        return markdown(["begun in", "control steps", "gait transitions", "pushes", "falls"], rows)
+        columns = {
+            "control steps": mean("steps", ".0f"),
+            "gait transitions": mean("transitions", ".0f"),
+            "pushes": mean("pushes", ".0f"),
+            "falls": mean("falls", ".0f"),
+        }
+        begun = group([own for own in results.records if "steps" in own], "task")
+        return table(begun, ["begun in"], columns)

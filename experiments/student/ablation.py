@@ -13,8 +13,8 @@ from experiments.stats import Group, group
 from experiments.student.commanded import DRAWN
 from experiments.student.episodes import counts, other_gaits
 from experiments.student.transitions import TransitionOptions, transition
-from experiments.study import Cell, Metrics, Study, option
-from experiments.tables import count, markdown, number, settings
+from experiments.study import EVALUATION_CODE, Cell, Metrics, Study, option
+from experiments.tables import count, mean, settings, share, table
 from experiments.training_runs import TrainedPolicy, TrainingRun, changed
 from trainers.pipeline.config import JobConfig
 from trainers.pipeline.presets import PRESETS
@@ -101,7 +101,7 @@ class Ablation(Study):
         transitions=TransitionOptions(1, 0.5, 2.5),
         reduced=PRESETS["smoke"] | {"tasks": ("trot", "bound"), "phase_free_s": 0.0, "round_episodes": 1},
     )
-    code = (*Study.code, "experiments.student.transitions", "experiments.training_runs")
+    code = (*EVALUATION_CODE, "experiments.student.transitions", "experiments.training_runs")
 
     def agents(self) -> list[Agent]:
         runs = {name: TrainingRun(self.options.job(name), self.cache / "training") for name in self.options.variants}
@@ -136,18 +136,14 @@ class Ablation(Study):
         return {"training": {name: changed(self.options.job(name)) for name in self.options.variants}}
 
     def table(self, results: Results) -> str:
-        gaits, rows = distinct(results.records, "task"), []
-        for agent, members in group(results.records, "agent").items():
-            per_gait = group([own for own in members if own["condition"] == DRAWN], "task")
-            aggregate = aggregate_variant(members)
-            counted = [count(per_gait[gait].rate()) if gait in per_gait else "-" for gait in gaits]
-            numbers = [
-                number(aggregate["error"], ".3f"),
-                *(count(aggregate[key]) for key in ("transitions", "changed")),
-            ]
-            rows.append([agent, *counted, *numbers, number(aggregate["r2"], ".4f")])
-        header = ["", *gaits, "velocity error [m/s]", "gait transitions", "changed world", "R2"]
-        return markdown(header, rows)
+        columns = {gait: share(task=gait, condition=DRAWN) for gait in distinct(results.records, "task")}
+        columns |= {
+            "velocity error [m/s]": mean("velocity_error", ".3f", condition=DRAWN),
+            "gait transitions": lambda members: count(aggregate_variant(members)["transitions"]),
+            "changed world": share(condition=CHANGED),
+            "R2": mean("r2", ".4f", condition=HELD_OUT),
+        }
+        return table(group(results.records, "agent"), [""], columns)
 
     def figure(self, results: Results) -> Figure:
         columns = {
@@ -164,13 +160,10 @@ class Ablation(Study):
 
 def aggregate_variant(records: Group) -> dict[str, Any]:
     """Of all gaits together: "success", "transitions" and "changed" as rates; means of "error" [m/s] and "r2"."""
-    of = {
-        name: Group(record for record in records if record["condition"] == name) for name in (DRAWN, CHANGED, HELD_OUT)
-    }
     return {
-        "success": of[DRAWN].rate(),
+        "success": records.where(condition=DRAWN).rate(),
+        "error": records.where(condition=DRAWN).mean("velocity_error"),
         "transitions": Group(record for record in records if record["condition"].startswith("to ")).rate(),
-        "changed": of[CHANGED].rate(),
-        "error": of[DRAWN].mean("velocity_error"),
-        "r2": of[HELD_OUT].mean("r2"),
+        "changed": records.where(condition=CHANGED).rate(),
+        "r2": records.where(condition=HELD_OUT).mean("r2"),
     }

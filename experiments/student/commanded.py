@@ -12,7 +12,7 @@ from experiments.results import Results, distinct
 from experiments.stats import Group, group
 from experiments.student.episodes import counts
 from experiments.student.phase import with_correction
-from experiments.study import Cell, Metrics, Study, option
+from experiments.study import EVALUATION_CODE, Cell, Metrics, Study, option
 from experiments.tables import count, judged, markdown, number
 from experiments.training_runs import TrainedPolicy, TrainingRun, changed
 from trainers.pipeline.config import JobConfig
@@ -54,7 +54,7 @@ class Commanded(Study):
     caption = "Success per gait and training seed, and velocity errors beside the expert's"
     full = CommandedOptions()
     quick = CommandedOptions((0,), 1, 1, 1, 3.0, 2.0, job=JobConfig.from_preset("smoke", tasks=("trot", "bound")))
-    code = (*Study.code, "experiments.student.phase", "experiments.training_runs")
+    code = (*EVALUATION_CODE, "experiments.student.phase", "experiments.training_runs")
 
     def agents(self) -> list[Agent]:
         root, policies, phase_free = self.cache / "training", [], []

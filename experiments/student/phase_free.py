@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 import trainers
 from experiments import plots
 from experiments.agents import Agent, shipped
-from experiments.results import Record, Results, distinct
+from experiments.results import Results, distinct
 from experiments.stats import Group, group
 from experiments.student.episodes import counts, other_gaits
 from experiments.student.phase import (
@@ -25,7 +25,7 @@ from experiments.student.phase import (
 )
 from experiments.student.transitions import TransitionOptions
 from experiments.study import ALL_GAITS, Cell, Metrics, Study, option
-from experiments.tables import count, markdown, number
+from experiments.tables import mean, share, table
 from experiments.training_runs import collect, kept_policy, rows_of
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.sensing.observation import ObservationLayout, SensorNoise
@@ -188,19 +188,15 @@ class PhaseFree(Study):
 
     def table(self, results: Results) -> str:
         gaits = [task for task in distinct(results.records, "task") if task != ALL_GAITS]
-        rows = []
-        for agent, members in group(results.records, "agent").items():
-            of = group(members, ["task", "condition"])
-            walking = of[ALL_GAITS, WALKING]
-            success = [count(of[gait, WALKING].rate()) for gait in gaits]
-            others = [
-                count(of[ALL_GAITS, key].rate()) if (ALL_GAITS, key) in of else "-" for key in (TRANSITIONS, NOISY)
-            ]
-            error = ", ".join(f"{own[key]:.3f}" for own in _phase_error(members) for key in ("median", "p99")) or "-"
-            tracked = number(walking.mean("velocity_error"), ".3f")
-            rows.append([agent, *success, count(walking.rate("survived")), tracked, *others, error])
-        more = ["survived", "velocity error [m/s]", "gait transitions", "noisy sensors", "phase error [cycles]"]
-        return markdown(["", *gaits, *more], rows)
+        together = {"task": ALL_GAITS, "condition": WALKING}
+        columns = {gait: share(task=gait, condition=WALKING) for gait in gaits} | {
+            "survived": share("survived", **together),
+            "velocity error [m/s]": mean("velocity_error", ".3f", **together),
+            TRANSITIONS: share(condition=TRANSITIONS),
+            NOISY: share(condition=NOISY),
+            "phase error [cycles]": _phase_error,
+        }
+        return table(group(results.records, "agent"), [""], columns)
 
     def figure(self, results: Results) -> Figure:
         agents = group(results.of(task=ALL_GAITS), ["condition", "agent"])
@@ -215,9 +211,10 @@ class PhaseFree(Study):
         return plots.dots({"success": success, "phase error [cycles]": errors}, log=["phase error [cycles]"])
 
 
-def _phase_error(members: Group) -> list[Record]:
-    """The record of the phase's error, if there is one."""
-    return [own for own in members if own["condition"] == PHASE_ERROR]
+def _phase_error(members: Group) -> str:
+    """Median and 99th percentile of the error of the phase."""
+    found = members.where(condition=PHASE_ERROR)
+    return f"{found[0]['median']:.3f}, {found[0]['p99']:.3f}" if found else "-"
 
 
 def walk(policy: Any, options: PhaseFreeOptions, episodes: int, seed: int) -> list[dict[str, Any]]:

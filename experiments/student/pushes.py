@@ -11,9 +11,9 @@ from experiments.agents import STUDENT, Agent, shipped, tasks_of, with_expert
 from experiments.pushing import CRUISE, DIRECTIONS, PAIRS, push_w, weaker
 from experiments.results import Results, distinct
 from experiments.searches import climb
-from experiments.stats import group
-from experiments.study import Cell, Metrics, Study, option
-from experiments.tables import markdown
+from experiments.stats import Group, group
+from experiments.study import EVALUATION_CODE, Cell, Metrics, Study, option
+from experiments.tables import Column, table
 from go1_mtl_gym import TASKS
 from trainers.data.environments import derive_seed, make_env
 from trainers.evaluation.rollout import Rollout
@@ -47,7 +47,7 @@ class Pushes(Study):
     caption = "Largest push survived, of student and expert"
     full = PushOptions()
     quick = PushOptions(1, grid=1, before_s=0.5, after_s=0.5)
-    code = (*Study.code, "experiments.pushing", "experiments.searches")
+    code = (*EVALUATION_CODE, "experiments.pushing", "experiments.searches")
     takes_policies = True
 
     def agents(self) -> list[Agent]:
@@ -82,12 +82,9 @@ class Pushes(Study):
         return {"largest": largest, "at_cap": largest == tried[-1][0], "tried": tried}
 
     def table(self, results: Results) -> str:
-        rows = []
-        for (gait, agent), members in group(results.records, ["task", "agent"]).items():
-            own = {record["condition"]: f"{'>= ' * record['at_cap']}{record['largest']:.1f}" for record in members}
-            rows.append([gait, agent, *(own.get(name, "-") for name in DIRECTIONS)])
-        rows.sort(key=lambda row: distinct(results.records, "task").index(row[0]))
-        return markdown(["gait", "", *(f"{name} [m/s]" for name in DIRECTIONS)], rows, text_columns=2)
+        gaits = distinct(results.records, "task")
+        groups = group(sorted(results.records, key=lambda own: gaits.index(own["task"])), ["task", "agent"])
+        return table(groups, ["gait", ""], {f"{name} [m/s]": _largest(name) for name in DIRECTIONS})
 
     def figure(self, results: Results) -> Figure:
         panels: dict[str, dict[str, dict[str, float | None]]] = {}
@@ -97,6 +94,16 @@ class Pushes(Study):
                 panel = panels.setdefault(f"largest push survived, {name} [m/s]", {})
                 panel.setdefault(agent, {})[gait] = weaker(largest, pair)
         return plots.dots(panels)
+
+
+def _largest(direction: str) -> Column:
+    """The largest push in a direction, which may be more where the search ended."""
+
+    def cell(members: Group) -> str:
+        found = members.where(condition=direction)
+        return f"{'>= ' * found[0]['at_cap']}{found[0]['largest']:.1f}" if found else "-"
+
+    return cell
 
 
 def survives(env: Any, policy: Any, cell: Cell, size: float, options: PushOptions, trial: tuple[int, int]) -> bool:

@@ -13,8 +13,8 @@ from experiments.agents import EXPERT, STUDENT, Agent, Expert, shipped, tasks_of
 from experiments.results import Record, Results, distinct
 from experiments.stats import group
 from experiments.student.episodes import counts
-from experiments.study import Cell, Metrics, Study, option
-from experiments.tables import count, markdown
+from experiments.study import EVALUATION_CODE, Cell, Metrics, Study, option
+from experiments.tables import Column, share, table
 from go1_mtl_gym.sensing.observation import SensorNoise
 from go1_mtl_gym.sensing.state_noise import EstimatorNoise
 
@@ -57,6 +57,7 @@ class Robustness(Study):
     caption = "Survival over friction, payload, delay, motors, contacts and noise, of student and expert"
     full = RobustnessOptions()
     quick = RobustnessOptions(1, 2.5, 1.5, every=4)
+    code = EVALUATION_CODE
     takes_policies = True
 
     def agents(self) -> list[Agent]:
@@ -78,19 +79,13 @@ class Robustness(Study):
         return levels
 
     def table(self, results: Results) -> str:
-        gaits, rows = distinct(results.records, "task"), []
-        for (agent, quantity), members in group(results.records, ["agent", "condition"]).items():
-            if agent != EXPERT:
-                middle = _middle(members)
-                per_gait = group([own for own in members if own["value"] == middle], "task")
-                cells = [
-                    ", ".join(count(per_gait[gait].rate(key), TARGET) for key in ("survived", "succeeded"))
-                    if gait in per_gait
-                    else "-"
-                    for gait in gaits
-                ]
-                rows.append([agent, QUANTITIES[quantity][0], f"{middle:g}", *cells])
-        return markdown(["", "quantity", "middle", *gaits], rows, text_columns=2)
+        policies = [own for own in results.records if own["agent"] != EXPERT]
+        groups = {}
+        for (agent, quantity), members in group(policies, ["agent", "condition"]).items():
+            middle = _middle(members)
+            groups[agent, QUANTITIES[quantity][0], f"{middle:g}"] = members.where(value=middle)
+        gaits = {gait: _both(gait) for gait in distinct(results.records, "task")}
+        return table(groups, ["", "quantity", "middle"], gaits)
 
     def figure(self, results: Results) -> Figure:
         shown = [name for name in QUANTITIES if name in distinct(results.records, "condition")]
@@ -115,6 +110,12 @@ def world(quantity: str, value: float, for_expert: bool) -> dict[str, Any]:
     if quantity != "noise":
         return {quantity: value}
     return {"estimator_noise": EstimatorNoise().scaled(value)} if for_expert else {"noise": SensorNoise().scaled(value)}
+
+
+def _both(gait: str) -> Column:
+    """Survived and successful episodes of a gait."""
+    cells = [share(key, TARGET, task=gait) for key in ("survived", "succeeded")]
+    return lambda members: ", ".join(cell(members) for cell in cells) if members.where(task=gait) else "-"
 
 
 def _middle(records: Sequence[Record]) -> float:

@@ -10,8 +10,8 @@ from experiments.agents import STUDENT, Agent, shipped, tasks_of, with_expert
 from experiments.results import Results, distinct
 from experiments.stats import Rate, group
 from experiments.student.episodes import counts, other_gaits
-from experiments.study import Cell, Metrics, Study, option
-from experiments.tables import count, markdown
+from experiments.study import EVALUATION_CODE, Cell, Metrics, Study, option
+from experiments.tables import share, table
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,7 @@ class Transitions(Study):
     caption = "Successful gait transitions, of student and expert"
     full = TransitionOptions()
     quick = TransitionOptions(1, 0.5, 3.0)
+    code = EVALUATION_CODE
     takes_policies = True
 
     def agents(self) -> list[Agent]:
@@ -48,13 +49,10 @@ class Transitions(Study):
         return transition(agent, cell, self.options, seed)
 
     def table(self, results: Results) -> str:
-        rates, rows = transition_rates(results), []
-        gaits = gaits_of(rates)
-        for agent in distinct(results.records, "agent"):
-            for (first,), members in group(results.of(agent=agent), ["task"]).items():
-                cells = [count(rates[agent].get((first, second), Rate(0, 0))) for second in gaits]
-                rows.append([agent, first, *cells, count(members.rate("survived"))])
-        return markdown(["", "from", *(f"to {gait}" for gait in gaits), "survived"], rows, text_columns=2)
+        targets = [name.removeprefix("to ") for name in distinct(results.records, "condition")]
+        gaits = dict.fromkeys([*distinct(results.records, "task"), *targets])
+        columns = {f"to {gait}": share(condition=f"to {gait}") for gait in gaits} | {"survived": share("survived")}
+        return table(group(results.records, ["agent", "task"]), ["", "from"], columns)
 
     def figure(self, results: Results) -> Figure:
         return plots.transition_figure(transition_rates(results), "successful gait transitions")
@@ -75,9 +73,3 @@ def transition_rates(results: Results, key: str = "succeeded") -> dict[str, dict
         if condition.startswith("to "):
             found.setdefault(agent, {})[first, condition.removeprefix("to ")] = members.rate(key)
     return found
-
-
-def gaits_of(rates: dict[str, dict[tuple[str, str], Rate]]) -> list[str]:
-    """Every gait that is changed from or to."""
-    pairs = [pair for own in rates.values() for pair in own]
-    return list(dict.fromkeys([first for first, _ in pairs] + [second for _, second in pairs]))

@@ -12,7 +12,7 @@ import trainers
 from experiments.agents import PolicyFile
 from experiments.benchmarks import expert as expert_benchmark
 from experiments.benchmarks import loops, rows, training, turns
-from experiments.benchmarks.peers import Go2ConvexMPC, MissingPeer
+from experiments.benchmarks.peers import Go2ConvexMPC, MissingPeerError
 from experiments.new_gaits import learning
 from experiments.new_gaits import study as new_gaits
 from experiments.paper import networks, settings
@@ -397,5 +397,5 @@ def test_exact_solvers_agree_and_ours_is_timed_from_the_inside_out():
 
 
 def test_a_folder_that_is_no_checkout_is_refused(tmp_path):
-    with pytest.raises(MissingPeer, match="no checkout"):
+    with pytest.raises(MissingPeerError, match="no checkout"):
         Go2ConvexMPC(tmp_path, TASKS["trot"].gait, (0.3, 0.0, 0.0))

@@ -6,7 +6,7 @@ import pytest
 
 from experiments import plots
 from experiments.searches import climb, climb_from, scouted
-from experiments.stats import Group, Rate, drops, estimate, group, spread
+from experiments.stats import Group, Rate, drops, estimate, group
 from experiments.tables import count, estimated, judged, spans
 
 RECORDS = [
@@ -46,10 +46,6 @@ def test_a_drop_is_real_if_it_exceeds_the_interval_of_the_difference():
     # 18/20 and 15/20 differ by 0.15, the interval reaches 0.24 below; 90/100 and 75/100 by as much, with 0.105.
     assert not drops(Rate(18, 20), Rate(15, 20)) and drops(Rate(90, 100), Rate(75, 100))
     assert not drops(Rate(0, 20), Rate(0, 20)) and not drops(Rate(5, 20), Rate(20, 20))
-
-
-def test_quartiles():
-    assert spread([4.0, 1.0, 2.0, 3.0, 5.0]) == [2.0, 3.0, 4.0]
 
 
 @pytest.mark.parametrize(("falls_above", "largest"), [(0.7, 0.6), (0.2, 0.2), (0.1, 0.0), (9.0, 0.8)])

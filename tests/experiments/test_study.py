@@ -108,11 +108,11 @@ def test_whatever_could_change_a_cell_is_measured_again(study, tmp_path, monkeyp
     others.append(study.cell_path(agent, cell, 3))
     monkeypatch.undo()
     monkeypatch.setattr(frame, "sources", lambda name: f"other code of {name}")
-    frame._code.cache_clear()
+    frame.code_digest.cache_clear()
     others.append(study.cell_path(agent, cell, 3))
     assert len({base, *others}) == len(others) + 1
     monkeypatch.undo()
-    frame._code.cache_clear()
+    frame.code_digest.cache_clear()
     assert study.cell_path(agent, cell, 3) == base
     assert len({study.folder, replace(study, options=Options(5)).folder}) == 2
 
