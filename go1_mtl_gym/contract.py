@@ -187,7 +187,7 @@ class PolicyContract:
             ignore: names of fields that may differ.
         """
         pairs = {each.name: (getattr(self, each.name), getattr(other, each.name)) for each in fields(self)}
-        if not (self.gaits and other.gaits) or "tasks" in ignore:
+        if not (self.gaits and other.gaits) or self.tasks != other.tasks:
             pairs["gaits"] = _shared_gaits(self, other)
         return {name: pair for name, pair in pairs.items() if name not in ignore and not _same(*pair)}
 
@@ -266,5 +266,7 @@ def _short(value: object) -> str:
     if isinstance(value, tuple) and value and isinstance(value[0], ObservationTerm):
         return "[" + ", ".join(f"{term.name} {term.size}" for term in value) + "]"
     if isinstance(value, tuple) and value and isinstance(value[0], float):
-        return "[" + ", ".join(f"{number:.4g}" for number in value) + "]"
+        legs = {value[i : i + 3] for i in range(0, len(value), 3)}
+        shown, times = (value, "") if len(legs) > 1 else (value[:3], f" x {len(value) // 3}")
+        return "[" + ", ".join(f"{number:.4g}" for number in shown) + "]" + times
     return str(value)

@@ -12,7 +12,7 @@ from tqdm.auto import tqdm
 
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
 from trainers.algorithms import losses
-from trainers.algorithms.optimizer import PRECISIONS, adamw_one_cycle, matmul_precision
+from trainers.algorithms.optimizer import PRECISIONS, WeightAverage, adamw_one_cycle, matmul_precision
 from trainers.data.batches import TensorBatches
 from trainers.data.demonstrations import Demonstrations
 from trainers.evaluation.metrics import offline_metrics
@@ -168,7 +168,7 @@ class BCTrainer(imitation_bc.BC):
             dataset.tasks, dataset.half_range, config.space, batches.rows, config.autocast
         )
         self.optimizer, schedule = _optimizer(policy, config)
-        average = _Average(policy.actor, config.ema_decay) if config.ema_decay else None
+        average = WeightAverage(policy.actor, config.ema_decay) if config.ema_decay else None
         self.history = BCHistory()
         first = self.steps_done
         was_training = policy.training
@@ -226,30 +226,6 @@ class _StepLogger(imitation_bc.BCLogger):
         self, batch_num: int, batch_size: int, num_samples_so_far: int, training_metrics: Any, rollout_stats: Any
     ) -> None:
         self.metrics = training_metrics
-
-
-class _Average:
-    """Exponential moving average of a network's weights, with a shorter memory in the first steps."""
-
-    def __init__(self, network: torch.nn.Module, decay: float) -> None:
-        self._weights = list(network.parameters())
-        self._average = [weight.detach().clone() for weight in self._weights]
-        self._decay = decay
-        self._updates = 0
-
-    @torch.no_grad()
-    def update(self) -> None:
-        """Take in the present weights."""
-        self._updates += 1
-        decay = min(self._decay, (1 + self._updates) / (10 + self._updates))
-        for average, weight in zip(self._average, self._weights):
-            average.lerp_(weight, 1 - decay)
-
-    @torch.no_grad()
-    def copy_to_network(self) -> None:
-        """Replace the network's weights by their average."""
-        for average, weight in zip(self._average, self._weights):
-            weight.copy_(average)
 
 
 def _optimizer(

@@ -48,3 +48,27 @@ def adamw_one_cycle(
         optimizer, learning_rate, total_steps=steps + 1, pct_start=warmup, cycle_momentum=False
     )
     return optimizer, schedule
+
+
+class WeightAverage:
+    """Exponential moving average of a network's weights, with a shorter memory in the first steps."""
+
+    def __init__(self, network: torch.nn.Module, decay: float) -> None:
+        self._weights = list(network.parameters())
+        self._average = [weight.detach().clone() for weight in self._weights]
+        self._decay = decay
+        self._updates = 0
+
+    @torch.no_grad()
+    def update(self) -> None:
+        """Take in the present weights."""
+        self._updates += 1
+        decay = min(self._decay, (1 + self._updates) / (10 + self._updates))
+        for average, weight in zip(self._average, self._weights):
+            average.lerp_(weight, 1 - decay)
+
+    @torch.no_grad()
+    def copy_to_network(self) -> None:
+        """Replace the network's weights by their average."""
+        for average, weight in zip(self._average, self._weights):
+            weight.copy_(average)

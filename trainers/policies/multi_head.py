@@ -22,6 +22,7 @@ from trainers.policies.checkpoint import (
     tensors_of,
     tuples,
 )
+from trainers.policies.checks import check_arguments, check_observation, check_spaces, number_of_tasks
 from trainers.policies.environment import ForEnvironment, json_arguments
 from trainers.policies.networks import MultiHeadActor, plain, seeded
 
@@ -97,10 +98,10 @@ class MultiHeadPolicy(SavedPolicy, ForEnvironment, ActorCriticPolicy):
         critic_lr_factor: float = 1.0,
         use_sde: bool = False,
     ) -> None:
-        n_tasks = _number_of_tasks(contract, n_tasks)
-        _check_arguments(observation_space, action_space, width, n_tasks, normalization, clip_sd, use_sde)
+        n_tasks = number_of_tasks(contract, n_tasks)
+        check_arguments(observation_space, action_space, width, n_tasks, normalization, clip_sd, use_sde)
         if contract is not None:
-            _check_spaces(contract, observation_space, action_space, n_tasks)
+            check_spaces(contract, observation_space, action_space, n_tasks)
         self.width = int(width)
         self.contract = contract
         self.n_tasks = int(n_tasks)
@@ -317,27 +318,8 @@ class MultiHeadPolicy(SavedPolicy, ForEnvironment, ActorCriticPolicy):
                 id.
         """
         if isinstance(observation, np.ndarray):
-            self._check_observation(observation)
+            check_observation(observation, self.contract, self.observation_space.shape[0], self.n_tasks, self.pooled)
         return super().predict(observation, state, episode_start, deterministic)
-
-    def _check_observation(self, obs: np.ndarray) -> None:
-        size = self.observation_space.shape[0]
-        if obs.ndim not in (1, 2) or obs.shape[-1] != size:
-            meant = (
-                ""
-                if self.contract is None
-                else f" ({self.contract.describe()}; policy.make_env() makes the environment)"
-            )
-            raise InvalidInputError(f"observations must have shape ({size},) or (n, {size}){meant}, got {obs.shape}")
-        if not np.isfinite(obs).all():
-            raise InvalidInputError("observation must be finite, got NaN or infinity")
-        task = obs[..., -self.n_tasks :]
-        if not self.pooled and not ((task.sum(-1) == 1.0) & (task.max(-1) == 1.0)).all():
-            row = task.reshape(-1, self.n_tasks)
-            row = row[(row.sum(-1) != 1.0) | (row.max(-1) != 1.0)][0]
-            raise InvalidInputError(
-                f"the last {self.n_tasks} entries of an observation must be a one-hot task id, got {row.tolist()}"
-            )
 
     # -- Files ---------------------------------------------------------------------------------------------------------
 
@@ -371,48 +353,3 @@ class MultiHeadPolicy(SavedPolicy, ForEnvironment, ActorCriticPolicy):
         policy.seed = None
         policy.load_state_dict(checkpoint.weights["weights"])
         return policy
-
-
-def _number_of_tasks(contract: PolicyContract | None, n_tasks: int | None) -> int:
-    if n_tasks is not None:
-        return n_tasks
-    if contract is None:
-        raise InvalidInputError(
-            "a contract (or, for an environment without one, n_tasks) must be given, got neither; with PPO: "
-            "policy_kwargs={'contract': env.unwrapped.contract}"
-        )
-    return contract.n_tasks
-
-
-def _check_spaces(contract: PolicyContract, observation_space: Any, action_space: Any, n_tasks: int) -> None:
-    sizes = (observation_space.shape, action_space.shape, n_tasks)
-    expected = ((contract.observation_size,), (len(contract.joints),), contract.n_tasks)
-    if sizes != expected:
-        raise InvalidInputError(
-            f"by the contract ({contract.describe()}) the shapes of observation and action space and n_tasks are "
-            f"{expected}, got {sizes}"
-        )
-
-
-def _check_arguments(
-    observation_space: Any,
-    action_space: Any,
-    width: int,
-    n_tasks: int,
-    normalization: str,
-    clip_sd: float,
-    sde: bool,
-) -> None:
-    if isinstance(n_tasks, bool) or not isinstance(n_tasks, (int, np.integer)) or n_tasks < 1:
-        raise InvalidInputError(f"n_tasks must be a positive integer, got {n_tasks!r}")
-    if not isinstance(width, (int, np.integer)) or width < 1:
-        raise InvalidInputError(f"width must be a positive integer, got {width!r}")
-    for space, smallest, what in ((observation_space, n_tasks, "observation_space"), (action_space, 0, "action_space")):
-        if not isinstance(space, spaces.Box) or len(space.shape) != 1 or space.shape[0] <= smallest:
-            raise InvalidInputError(f"{what} must be a flat Box of more than {smallest} entries, got {space}")
-    if normalization not in norm.MODES:
-        raise InvalidInputError(f"normalization must be one of {', '.join(norm.MODES)}; got {normalization!r}")
-    if not clip_sd > 0:
-        raise InvalidInputError(f"clip_sd must be positive, got {clip_sd!r}")
-    if sde:
-        raise InvalidInputError("use_sde is not supported: the exploration noise does not depend on the state")
