@@ -54,9 +54,9 @@ def summary_table(results: Results) -> str:
     rows = []
     for task in distinct(results.records, "task"):
         both = [Group(results.of(task=task, agent=agent)) for agent in (EXPERT, STUDENT)]
-        cells = [count(own.rate()) for own in both]
+        cells = [count(members.rate()) for members in both]
         for key, how in (("velocity_error", ".3f"), ("step_rate", ".2f")):
-            cells += [number(own.mean(key), how) for own in both]
+            cells += [number(members.mean(key), how) for members in both]
         rows.append([task, *cells, f"{TASKS[task].gait.step_rate:.2f}"])
     metrics = ("success", "velocity error [m/s]", "steps per second")
     header = [f"{metric}: {agent}" for metric in metrics for agent in ("expert", "student")]

@@ -105,7 +105,7 @@ def band(ax: Axes, x: Sequence[float], rates: Sequence[Rate], color: Any, alpha:
 
 def survival_and_success(ax: Axes, levels: Mapping[float, Group], color: str, label: str) -> None:
     """Survival (solid, with 95 % intervals) and success (dashed) over what the levels differ in."""
-    survival, success = ([own.rate(key) for own in levels.values()] for key in ("survived", "succeeded"))
+    survival, success = ([members.rate(key) for members in levels.values()] for key in ("survived", "succeeded"))
     band(ax, [*levels], survival, color, 0.12)
     solid = {"color": color, "linewidth": 2.0, "marker": "o", "markersize": 3.5, "label": label}
     ax.plot([*levels], [rate.value for rate in survival], **solid)

@@ -57,10 +57,10 @@ def scouted(
         top += 1
     passed = None
     for level in [*reversed(levels[:top] or levels[:1]), *below]:
-        found = try_all(level)
-        if found is None:
+        outcome = try_all(level)
+        if outcome is None:
             continue
-        passed = passed or (level, found)
-        if good(found):
+        passed = passed or (level, outcome)
+        if good(outcome):
             return passed, level
     return passed, 0.0

@@ -86,11 +86,11 @@ def estimate(values: Sequence[float]) -> Estimate:
 
 def group(records: Iterable[Record], by: str | Sequence[str]) -> dict[Any, Group]:
     """The records by the values of one key, or by the tuples of values of several; keys that are missing are None."""
-    found: dict[Any, list[Record]] = {}
+    groups: dict[Any, list[Record]] = {}
     for record in records:
         key = record.get(by) if isinstance(by, str) else tuple(record.get(name) for name in by)
-        found.setdefault(key, []).append(record)
-    return {key: Group(members) for key, members in found.items()}
+        groups.setdefault(key, []).append(record)
+    return {key: Group(members) for key, members in groups.items()}
 
 
 def drops(before: Rate, after: Rate) -> bool:

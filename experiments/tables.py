@@ -32,7 +32,7 @@ def table(groups: Mapping[Any, Group], labels: Sequence[str], columns: Mapping[s
         columns: header -> what writes a group's cell.
     """
     keys = {key: key if isinstance(key, tuple) else (key,) for key in groups}
-    rows = [[*map(str, keys[key]), *(cell(own) for cell in columns.values())] for key, own in groups.items()]
+    rows = [[*map(str, keys[key]), *(cell(members) for cell in columns.values())] for key, members in groups.items()]
     return markdown([*labels, *columns], rows, text_columns=len(labels))
 
 

@@ -109,8 +109,8 @@ class TrainedPolicy(PolicyFile):
 
 def changed(config: JobConfig) -> dict[str, Any]:
     """The settings that are not the main job's defaults and that its policies depend on."""
-    default, own = JobConfig().as_dict(), config.as_dict()
-    return {name: value for name, value in own.items() if name not in UNUSED and value != default[name]}
+    default, given = JobConfig().as_dict(), config.as_dict()
+    return {name: value for name, value in given.items() if name not in UNUSED and value != default[name]}
 
 
 # -- What cells share --------------------------------------------------------------------------------------------------

@@ -99,7 +99,7 @@ class ExpertBenchmark(Study):
             for (name, scope), values in times.items()
         ]
         forces = {name: {"median_n": np.median(v), "largest_n": np.max(v)} for name, v in errors.items()}
-        return records + [{"agent": name, "condition": FORCE_ERROR, **own} for name, own in forces.items()]
+        return records + [{"agent": name, "condition": FORCE_ERROR, **error} for name, error in forces.items()]
 
     def published_options(self) -> dict[str, Any]:
         checkout = "PATH" if self.options.go2_convex_mpc else ""
@@ -112,9 +112,9 @@ class ExpertBenchmark(Study):
             "in units of ours": mean("ratio", ".2f"),
         }
         groups = {
-            (meaning, agent): own
+            (meaning, agent): members
             for scope, meaning in SCOPES.items()
-            for agent, own in group(results.of(condition=scope), "agent").items()
+            for agent, members in group(results.of(condition=scope), "agent").items()
         }
         return table(groups, ["timed", "agent"], columns)
 

@@ -91,9 +91,12 @@ def blocks(
     rows_of = [torch.from_numpy(np.flatnonzero(data.task == k)).to(device) for k in range(len(data.tasks))]
     share = batch_size // len(rows_of)
     while True:
-        shuffled = [own[torch.randperm(len(own), generator=generator, device=device)] for own in rows_of]
+        shuffled = [
+            rows_of_task[torch.randperm(len(rows_of_task), generator=generator, device=device)]
+            for rows_of_task in rows_of
+        ]
         for i in range(min(map(len, shuffled)) // share):
-            index = torch.cat([own[i * share : (i + 1) * share] for own in shuffled])
+            index = torch.cat([rows_of_task[i * share : (i + 1) * share] for rows_of_task in shuffled])
             yield obs.index_select(0, index), acts.index_select(0, index)
 
 
@@ -115,7 +118,7 @@ def bare_loop(
     for obs, acts in itertools.islice(batches, config.steps):
         x = ((obs[:, :-n_tasks] - inputs.shift) / inputs.scale).clamp(-policy.clip_sd, policy.clip_sd)
         features = policy.actor.trunk(x).chunk(n_tasks)
-        y = torch.cat([head(own) for head, own in zip(policy.actor.heads, features)])
+        y = torch.cat([head(part) for head, part in zip(policy.actor.heads, features)])
         error = (outputs.shift + outputs.scale * y - acts) * radians
         error.square().view(n_tasks, -1).mean(dim=1).sum().backward()
         torch.nn.utils.clip_grad_norm_(weights, config.max_grad_norm)

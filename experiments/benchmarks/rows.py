@@ -91,9 +91,9 @@ def _read_arrays(paths: Sequence[Path]) -> dict[str, np.ndarray]:
     parts: dict[str, list[np.ndarray]] = {"obs": [], "acts": [], "starts": []}
     for path in paths:
         with np.load(path) as archive:
-            for name, own in parts.items():
-                own.append(archive[name])
-    return {name: np.concatenate(own) for name, own in parts.items()}
+            for name, arrays in parts.items():
+                arrays.append(archive[name])
+    return {name: np.concatenate(arrays) for name, arrays in parts.items()}
 
 
 def _numpy_batches(data: Demonstrations, batch_size: int, rng: np.random.Generator) -> Iterator[Any]:

@@ -64,12 +64,12 @@ class TrainingBenchmark(Study):
 
 
 def _table(members: Group) -> str:
-    references = list(dict.fromkeys(name for own in members for name in own["over"]))
+    references = list(dict.fromkeys(name for record in members for name in record["over"]))
     others = [name for name in ("loss",) if members.values(name)]
     rows = []
-    for own in members:
-        ratios = [spans(own["over"].get(name, {}).get(RATE)) for name in references]
-        metrics = [spans(own.get(name), ".2e") for name in others]
-        rows.append([own["condition"], own["agent"], f"{own[RATE][1]:.0f}", *ratios, *metrics])
+    for record in members:
+        ratios = [spans(record["over"].get(name, {}).get(RATE)) for name in references]
+        metrics = [spans(record.get(name), ".2e") for name in others]
+        rows.append([record["condition"], record["agent"], f"{record[RATE][1]:.0f}", *ratios, *metrics])
     header = ["setting", "agent", "samples/s", *(f"x {name}" for name in references), *others]
     return markdown(header, rows, text_columns=2)

@@ -143,10 +143,10 @@ def summary(values: Mapping[str, Mapping[str, Sequence[float]]], references: Seq
     return [
         {
             "agent": name,
-            **{metric: spread(own) for metric, own in metrics.items()},
+            **{metric: spread(series) for metric, series in metrics.items()},
             "over": {
                 reference: {
-                    metric: spread(np.divide(own, values[reference][metric])) for metric, own in metrics.items()
+                    metric: spread(np.divide(series, values[reference][metric])) for metric, series in metrics.items()
                 }
                 for reference in references
                 if reference != name

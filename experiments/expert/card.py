@@ -46,8 +46,8 @@ def _row(gait: str, measured: Mapping[str, Results]) -> list[str]:
         return Group(measured[study].of(task=gait, **values)) if study in measured else Group()
 
     drawn = of("expert_commands", condition=ONE)
-    tracked = {own["condition"]: own["tracked_to"] for own in of("expert_limits")}
-    largest = {own["condition"]: own["largest"] for own in of("expert_pushes")}
+    tracked = {record["condition"]: record["tracked_to"] for record in of("expert_limits")}
+    largest = {record["condition"]: record["largest"] for record in of("expert_pushes")}
     back, forth, vy = (number(tracked.get(axis), ".1f") for axis in ("-vx", "vx", "vy"))
     return [
         gait,

@@ -36,7 +36,7 @@ class Commands(ExpertStudy):
         options, records = self.options, []
         for condition, interval in ((ONE, None), (CHANGING, options.change_s)):
             result = lab.score(task, options.seconds, seed, options.episodes, command_interval=interval)
-            records += [{"condition": condition, **episode(own)} for own in result.episodes]
+            records += [{"condition": condition, **episode(walked)} for walked in result.episodes]
         return records
 
     def table(self, results: Results) -> str:

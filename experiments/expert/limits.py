@@ -80,7 +80,7 @@ class Limits(ExpertStudy):
             below,
             scout=lambda level: errors(level, options.scouts) is not None,
             try_all=lambda level: errors(level, options.trials),
-            good=lambda own: own[0] <= TRACKED[0] and own[1] <= TRACKED[1],
+            good=lambda means: means[0] <= TRACKED[0] and means[1] <= TRACKED[1],
         )
         level, (velocity, yaw_rate) = survived or (0.0, (None, None))
         at_cap = survived is not None and level == levels[-1]
@@ -89,7 +89,9 @@ class Limits(ExpertStudy):
 
     def table(self, results: Results) -> str:
         columns = {
-            "survived": lambda own: mean("survived_to", "g")(own) + " (end of the search)" * own[0]["at_cap"],
+            "survived": lambda members: (
+                mean("survived_to", "g")(members) + " (end of the search)" * members[0]["at_cap"]
+            ),
             "velocity error there [m/s]": mean("velocity_error", ".3f"),
             "yaw rate error there [rad/s]": mean("yaw_rate_error", ".3f"),
             "and tracked": mean("tracked_to", "g"),
@@ -101,7 +103,9 @@ class Limits(ExpertStudy):
         series = {"survived": "survived_to", "and tracked": "tracked_to"}
         return plots.dots(
             {
-                titles[axis]: {name: {own["task"]: own[key] for own in members} for name, key in series.items()}
+                titles[axis]: {
+                    name: {record["task"]: record[key] for record in members} for name, key in series.items()
+                }
                 for axis, members in group(results.records, "condition").items()
             }
         )
@@ -150,10 +154,10 @@ class Pushes(ExpertStudy):
     code = (*ExpertStudy.code, "experiments.pushing", "experiments.searches")
 
     def measure_in(self, lab: Lab, task: str, seed: int) -> list[dict[str, Any]]:
-        found = {
+        sizes = {
             direction: largest_push(lab, task, direction, self.options, seed) for direction in self.options.directions
         }
-        return [{"condition": direction, "largest": largest} for direction, largest in found.items()]
+        return [{"condition": direction, "largest": largest} for direction, largest in sizes.items()]
 
     def table(self, results: Results) -> str:
         columns = {f"{name} [m/s]": mean("largest", ".1f", condition=name) for name in DIRECTIONS}
@@ -161,7 +165,9 @@ class Pushes(ExpertStudy):
 
     def figure(self, results: Results) -> Figure:
         directions = group(results.records, "condition").items()
-        largest = {direction: {own["task"]: own["largest"] for own in members} for direction, members in directions}
+        largest = {
+            direction: {record["task"]: record["largest"] for record in members} for direction, members in directions
+        }
         return plots.dots({"largest push survived [m/s]": largest})
 
 

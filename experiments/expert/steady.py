@@ -33,7 +33,7 @@ class SteadyOptions(ExpertOptions):
 
 
 COLUMNS = {
-    "command": lambda own: " ".join(f"{value:.2f}" for value in own[0]["command"]),
+    "command": lambda members: " ".join(f"{value:.2f}" for value in members[0]["command"]),
     "contact as planned": mean("contact_agreement", ".3f"),
     "touchdown lag [s]": mean("touchdown_lag_s", ".3f"),
     "flight": mean("flight_fraction", ".3f"),
@@ -43,8 +43,10 @@ COLUMNS = {
     "height [m]": mean("height", ".3f"),
     "RMS velocity error [m/s]": mean("rms_velocity_error", ".3f"),
     "QP iterations": mean("qp_iterations", ".0f"),
-    "roll from, to [deg]": lambda own: " ".join(f"{value:.1f}" for value in own[0].get("roll_deg", ())) or "-",
-    "pitch from, to [deg]": lambda own: " ".join(f"{value:.1f}" for value in own[0].get("pitch_deg", ())) or "-",
+    "roll from, to [deg]": lambda members: " ".join(f"{value:.1f}" for value in members[0].get("roll_deg", ())) or "-",
+    "pitch from, to [deg]": lambda members: (
+        " ".join(f"{value:.1f}" for value in members[0].get("pitch_deg", ())) or "-"
+    ),
 }
 
 
@@ -68,13 +70,13 @@ class Steady(ExpertStudy):
         return table(group(results.records, ["task", "condition"]), ["gait", "walk"], COLUMNS)
 
     def figure(self, results: Results) -> Figure:
-        known = [own for own in results.records if "schedule" in own]
+        known = [record for record in results.records if "schedule" in record]
         columns = 2 if len(known) > 1 else 1
         rows = max(1, -(-len(known) // columns))
         figure = plots.new_figure(4.4 * columns + 0.3, 1.55 * rows + 0.6)
         axes = figure.subplots(rows, columns, squeeze=False).ravel()
-        for ax, own in zip(axes, known):
-            _contacts(ax, own)
+        for ax, record in zip(axes, known):
+            _contacts(ax, record)
         for ax in axes[len(known) :]:
             ax.set_axis_off()
         for ax in axes[max(0, len(known) - columns) : len(known)]:

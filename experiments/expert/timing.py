@@ -67,14 +67,14 @@ class Timing(ExpertStudy):
     def measure_in(self, lab: Lab, task: str, seed: int) -> list[dict[str, Any]]:
         states = walked_states(lab, task, self.options.states, seed)
         labs = {name: Lab(lab.env.control_hz, make_expert(name)) for name in SETTINGS if task in COMPARED}
-        for own in labs.values():
-            own.begin(task, CRUISE, "timing", seed)
-            own.walk(0.1)
+        for other in labs.values():
+            other.begin(task, CRUISE, "timing", seed)
+            other.walk(0.1)
         calls = {UPDATE: partial(mpc_update, lab.counted.expert), ACTION: lab.counted.action}
-        calls |= {name: own.counted.action for name, own in labs.items()}
+        calls |= {name: other.counted.action for name, other in labs.items()}
         times = {name: quantiles(seconds) for name, seconds in interleaved(calls, states).items()}
-        for own in labs.values():
-            lab.ledger.add(own.settle())
+        for other in labs.values():
+            lab.ledger.add(other.settle())
         return [
             *({"condition": name, **times[name]} for name in (UPDATE, ACTION)),
             *({"agent": name, "condition": COMPARED_ACTION, **times[name]} for name in labs),
@@ -89,16 +89,18 @@ class Timing(ExpertStudy):
         for gait, members in group(results.records, "task").items():
             of = group(members, "condition")
             times = [f"{of[name][0][key]:.2f}" for name in (UPDATE, ACTION) for key in ("median_ms", "p99_ms")]
-            for own in of[REAL_TIME]:
-                factors = [f"{own[name]:.1f}" for name in ("expert", "environment", "physics")]
-                rows.append([gait, f"{own['control_hz']} Hz", *times, *factors, f"{own['expert_to_physics']:.3f}"])
+            for record in of[REAL_TIME]:
+                factors = [f"{record[name]:.1f}" for name in ("expert", "environment", "physics")]
+                rows.append(
+                    [gait, f"{record['control_hz']} Hz", *times, *factors, f"{record['expert_to_physics']:.3f}"]
+                )
         header = ["gait", "control", "MPC update [ms]", "p99", "action [ms]", "p99", "expert x real time"]
         return markdown([*header, "environment x", "MuJoCo x", "expert / MuJoCo"], rows, text_columns=2)
 
     def paragraphs(self, results: Results) -> list[str]:
         compared = group(results.of(condition=COMPARED_ACTION), "agent")
-        gaits = list(dict.fromkeys(own["task"] for members in compared.values() for own in members))
-        rows = [[name, *(f"{own['median_ms']:.2f}" for own in members)] for name, members in compared.items()]
+        gaits = list(dict.fromkeys(record["task"] for members in compared.values() for record in members))
+        rows = [[name, *(f"{record['median_ms']:.2f}" for record in members)] for name, members in compared.items()]
         table = markdown(["action [ms]", *gaits], rows)
         return [*super().paragraphs(results), "Median time of an action with other settings:", table]
 
@@ -226,5 +228,5 @@ class Settings(ExpertStudy):
             "push to the side [m/s]": mean("lateral_push", ".1f"),
         }
         tasks = list(group(results.records, "task"))
-        records = sorted(results.records, key=lambda own: tasks.index(own["task"]))
+        records = sorted(results.records, key=lambda record: tasks.index(record["task"]))
         return table(group(records, ["task", "agent"]), ["gait", "settings"], columns)

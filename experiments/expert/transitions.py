@@ -104,5 +104,5 @@ class LongWalk(ExpertStudy):
             "pushes": mean("pushes", ".0f"),
             "falls": mean("falls", ".0f"),
         }
-        begun = group([own for own in results.records if "steps" in own], "task")
+        begun = group([record for record in results.records if "steps" in record], "task")
         return table(begun, ["begun in"], columns)

@@ -100,7 +100,7 @@ class NewGaits(Study):
         options, base, jobs = self.options, self.base.load(), []
         for gait in options.gaits:
             seeds = [options.job_of(base, (gait,), seed) for seed in options.seeds]
-            jobs += [job for own in seeds for job in demonstrations(own, options.demonstrations_s[-1])]
+            jobs += [job for each in seeds for job in demonstrations(each, options.demonstrations_s[-1])]
             jobs += held_out(base, gait, options)
         collect(jobs, self.folder, n_jobs)
         rehearsal(base, options, self.folder)
@@ -131,7 +131,7 @@ class NewGaits(Study):
         if agent.name != TUNED:
             return record
         old = self._old_gaits(policy, base.tasks, f"{OLD}, after {cell.task}", seed)
-        return [record, *({"demonstrations_s": demonstrations_s} | own for own in old)]
+        return [record, *({"demonstrations_s": demonstrations_s} | episode for episode in old)]
 
     def _walk(self, policy: Any, gait: str, episodes: int, seed: int, **env_kwargs: Any) -> dict[str, Any]:
         """Closed loop under commands that change."""
@@ -151,17 +151,17 @@ class NewGaits(Study):
             for method, levels in methods.items():
                 budgets = [f"{seconds:g} s" for seconds in levels]
                 cells = [
-                    f"{percent(own.rate())} ({percent(own.rate('survived'))}) {own.mean('r2'):.4f}"
-                    for own in levels.values()
+                    f"{percent(level.rate())} ({percent(level.rate('survived'))}) {level.mean('r2'):.4f}"
+                    for level in levels.values()
                 ]
                 least, (seconds, last) = enough(levels), list(levels.items())[-1]
                 after = results.of(agent=method, condition=f"{OLD}, after {gait}", demonstrations_s=seconds)
-                members = Group(own for level in levels.values() for own in level)
+                members = Group(record for level in levels.values() for record in level)
                 error = number(last.mean("velocity_error"), ".3f")
                 all_survive = "-" if least is None else f"{least:g} s"
                 rows.append([gait, method, *cells, all_survive, error, old_cell(members, Group(after))])
         header = ["gait", "learned", *budgets, "all survive from", "velocity error [m/s]", "old gaits"]
-        expert = [f"{count(Group([own]).rate())} of {own['task']}" for own in results.of(agent=EXPERT)]
+        expert = [f"{count(Group([record]).rate())} of {record['task']}" for record in results.of(agent=EXPERT)]
         before = count(Group(results.of(agent=BEFORE)).rate())
         return "\n\n".join(
             [
@@ -177,7 +177,7 @@ class NewGaits(Study):
         for (shares, errors), (gait, methods) in zip(axes, gaits.items()):
             for method, levels in methods.items():
                 plots.survival_and_success(shares, levels, COLORS[method], method)
-                missing = [1 - own.mean("r2") for own in levels.values()]
+                missing = [1 - level.mean("r2") for level in levels.values()]
                 errors.plot([*levels], missing, "o-", color=COLORS[method], markersize=3.5)
             shares.set_title(gait, loc="left", fontsize=10)
             errors.set_ylabel("1 - R2, held out", fontsize=9)
@@ -190,13 +190,13 @@ class NewGaits(Study):
 
 def _by_method(results: Results) -> dict[str, dict[str, dict[float, Group]]]:
     """{gait: {method: {seconds of demonstrations, rising: records of all seeds}}}."""
-    members = Group(own for own in results.of(condition=NEW) if own["agent"] != EXPERT)
+    members = Group(record for record in results.of(condition=NEW) if record["agent"] != EXPERT)
     return {
         gait: {
             method: dict(sorted(group(records, "demonstrations_s").items()))
-            for method, records in group(own, "agent").items()
+            for method, records in group(of_gait, "agent").items()
         }
-        for gait, own in group(members, "task").items()
+        for gait, of_gait in group(members, "task").items()
     }
 
 
@@ -207,8 +207,8 @@ def enough(levels: Mapping[float, Group]) -> float | None:
         levels: records by seconds, rising.
     """
     least = None
-    for seconds, own in reversed(levels.items()):
-        if own.total("survived") < own.total("trials"):
+    for seconds, level in reversed(levels.items()):
+        if level.total("survived") < level.total("trials"):
             break
         least = seconds
     return least

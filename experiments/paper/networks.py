@@ -123,8 +123,8 @@ def thinned(rows: trainers.Demonstrations, per_gait: int) -> trainers.Demonstrat
     """At most so many rows of every gait, drawn at random: evenly spaced ones would meet few phases of a cycle."""
     rng = np.random.default_rng(per_gait)
     parts = [
-        own.take(np.sort(rng.choice(len(own), min(per_gait, len(own)), replace=False)))
-        for own in rows.per_task().values()
+        part.take(np.sort(rng.choice(len(part), min(per_gait, len(part)), replace=False)))
+        for part in rows.per_task().values()
     ]
     return trainers.Demonstrations.concatenate(parts)
 
@@ -139,5 +139,5 @@ def curve(r2: dict[str, list[float]], rows: trainers.Demonstrations) -> dict[str
     Returns:
         gait -> mean squared error of the joint targets [rad^2].
     """
-    variance = {gait: float((own.half_range * own.acts).var(axis=0).mean()) for gait, own in rows.per_task().items()}
+    variance = {gait: float((part.half_range * part.acts).var(axis=0).mean()) for gait, part in rows.per_task().items()}
     return {gait: [(1.0 - value) * variance[gait] for value in values] for gait, values in r2.items()}

@@ -119,16 +119,16 @@ class PaperStudy(Study):
 
     def figure(self, results: Results) -> Figure:
         colors, styles = {MULTI_HEAD: plots.BLUE, POOLED: plots.RED}, ("-", "--", ":", "-.")
-        curves = [own for own in results.of(condition=CURVE) if own["agent"] in colors]
-        widths = sorted({own["width"] for own in curves}, reverse=True)
+        curves = [record for record in results.of(condition=CURVE) if record["agent"] in colors]
+        widths = sorted({record["width"] for record in curves}, reverse=True)
         per_gait = group(curves, "task")
         figure = plots.new_figure(3.3 * max(1, len(per_gait)) + 0.4, 3.2)
         axes = figure.subplots(1, max(1, len(per_gait)), squeeze=False, sharey=True)[0]
         for ax, (gait, members) in zip(axes, per_gait.items()):
-            for own in members:
-                style = styles[min(widths.index(own["width"]), len(styles) - 1)]
-                label = f"{KINDS[own['agent']]}, {own['width']} wide"
-                ax.plot(own["at_step"], own["curve_mse"], style, color=colors[own["agent"]], label=label)
+            for record in members:
+                style = styles[min(widths.index(record["width"]), len(styles) - 1)]
+                label = f"{KINDS[record['agent']]}, {record['width']} wide"
+                ax.plot(record["at_step"], record["curve_mse"], style, color=colors[record["agent"]], label=label)
             ax.set_yscale("log")
             ax.xaxis.set_major_locator(MaxNLocator(4))
             ax.set_title(gait, fontsize=10)
@@ -184,8 +184,8 @@ class Estimator(PaperStudy):
 
 def learners(records: Sequence[Record]) -> dict[Learner, Group]:
     """The records of every learner, sorted."""
-    found = group(records, ["width", "steps", "precision", "agent"])
-    ranked = {Learner(*key[:3], [*KINDS].index(key[3])): members for key, members in found.items()}
+    groups = group(records, ["width", "steps", "precision", "agent"])
+    ranked = {Learner(*key[:3], [*KINDS].index(key[3])): members for key, members in groups.items()}
     return dict(sorted(ranked.items()))
 
 
@@ -225,11 +225,11 @@ def verdict_table(name: str, results: Results) -> str:
     rows = []
     for gait, target in TARGETS[name].items():
         for use in uses(results):
-            found = scores(results, gait, use)
-            for learner in (each for each in found if each.kind == MULTI_HEAD):
-                pooled = found.get(learner._replace(rank=[*KINDS].index(POOLED)))
-                better = "-" if pooled is None else _better(worse_than_pooled(found[learner], pooled))
-                r2 = found[learner].mean("r2")
+            metrics = scores(results, gait, use)
+            for learner in (each for each in metrics if each.kind == MULTI_HEAD):
+                pooled = metrics.get(learner._replace(rank=[*KINDS].index(POOLED)))
+                better = "-" if pooled is None else _better(worse_than_pooled(metrics[learner], pooled))
+                r2 = metrics[learner].mean("r2")
                 reached = number(r2, ".5f") if r2 > target else f"**{number(r2, '.5f')}**"
                 about = [str(learner.width), str(learner.steps), f"> {target:g}"]
                 rows.append([gait, USES[use], learner.precision, *about, reached, better])
@@ -245,11 +245,11 @@ def _better(worse: Sequence[str]) -> str:
 
 def data_table(results: Results) -> str:
     """One row per gait: seconds of rows, and falls of the expert, by use."""
-    data = [own for own in results.of(agent=EXPERT) if own["condition"].startswith("data: ")]
-    held = [use for use in USES if any(own["condition"] == f"data: {use}" for own in data)]
+    data = [record for record in results.of(agent=EXPERT) if record["condition"].startswith("data: ")]
+    held = [use for use in USES if any(record["condition"] == f"data: {use}" for record in data)]
     rows = []
     for gait, members in group(data, "task").items():
-        seconds = {own["condition"]: f"{own['data_s']:g}" for own in members}
+        seconds = {record["condition"]: f"{record['data_s']:g}" for record in members}
         by_use = [seconds[f"data: {use}"] for use in (TRAIN, *held)]
         rows.append([gait, *by_use, str(members.total("falls"))])
     header = ["gait", "training [s]", *(f"{USES[use]} [s]" for use in held), "falls of the expert"]
@@ -260,7 +260,7 @@ def training_table(results: Results) -> str:
     """One row per learner: number of networks, time and rows per second of all its trainings."""
     rows = []
     for learner, members in learners(results.of(condition=TRAINING)).items():
-        devices = sorted({f"{own['device']}, {own['threads']} thread(s)" for own in members})
+        devices = sorted({f"{record['device']}, {record['threads']} thread(s)" for record in members})
         where = [KINDS[learner.kind], "; ".join(devices), learner.precision]
         about = [str(learner.width), str(learner.steps), str(len(members)), f"{members.total('seconds') / 60:.1f}"]
         rows.append([*where, *about, f"{members.mean('samples_per_s'):,.0f}"])
@@ -276,10 +276,10 @@ def summary(measured: Mapping[str, Results]) -> list[str]:
         data = name.removeprefix("paper_")
         for gait, published in PUBLISHED[settings.TABLES[data].published].items():
             theirs = [number(published.get(kind, {}).get("r2"), ".4f") for kind in (MULTI_HEAD, POOLED)]
-            found = scores(results, gait, uses(results)[0])
-            for way in dict.fromkeys(learner[:3] for learner in found):
-                ranked = [found.get(Learner(*way, rank)) for rank in range(len(KINDS))]
-                ours = ["-" if own is None else estimated(own.estimate("r2"), ".4f") for own in ranked]
+            metrics = scores(results, gait, uses(results)[0])
+            for way in dict.fromkeys(learner[:3] for learner in metrics):
+                ranked = [metrics.get(Learner(*way, rank)) for rank in range(len(KINDS))]
+                ours = ["-" if members is None else estimated(members.estimate("r2"), ".4f") for members in ranked]
                 rows.append([data.replace("_", " "), gait, *theirs, ", ".join(map(str, way)), *ours])
     theirs = [f"{PAPERS_KINDS[kind]}, paper" for kind in (MULTI_HEAD, POOLED)]
     header = ["data", "gait", *theirs, "width, steps, trained in", *(f"{kind}, here" for kind in KINDS.values())]

@@ -153,8 +153,10 @@ class Ablation(Study):
             "changed": "changed world",
             "r2": "one-step R2",
         }
-        aggregates = {name: aggregate_variant(own) for name, own in group(results.records, "agent").items()}
-        variants = {label: {name: own[key] for name, own in aggregates.items()} for key, label in columns.items()}
+        aggregates = {name: aggregate_variant(variant) for name, variant in group(results.records, "agent").items()}
+        variants = {
+            label: {name: variant[key] for name, variant in aggregates.items()} for key, label in columns.items()
+        }
         return plots.dots({label: {"variants": values} for label, values in variants.items()})
 
 

@@ -99,7 +99,7 @@ class Commanded(Study):
             if seeds:
                 together, ratio = seeds.rate(), _worst_ratio(seeds, expert)
                 low, high = together.interval
-                worst = min(own.rate().value for own in group(seeds, "seed").values())
+                worst = min(of_seed.rate().value for of_seed in group(seeds, "seed").values())
                 errors = (seeds.mean("velocity_error"), seeds.largest("velocity_error"))
                 success = [
                     count(together, TARGETS["success_rate"]),
@@ -120,7 +120,9 @@ class Commanded(Study):
         for gait in distinct(results.records, "task"):
             seeds, expert = _seeds(results, gait), _members(results, gait, EXPERT, DRAWN)
             success["all seeds"][gait], errors["all seeds"][gait] = seeds.rate(), seeds.mean("velocity_error")
-            success["worst seed"][gait] = min((own.rate() for own in group(seeds, "seed").values()), default=None)
+            success["worst seed"][gait] = min(
+                (of_seed.rate() for of_seed in group(seeds, "seed").values()), default=None
+            )
             errors["worst seed"][gait] = seeds.largest("velocity_error")
             errors[EXPERT][gait] = expert.mean("velocity_error")
         return plots.dots({"success": success, "velocity error [m/s]": errors})

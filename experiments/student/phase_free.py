@@ -201,11 +201,11 @@ class PhaseFree(Study):
     def figure(self, results: Results) -> Figure:
         agents = group(results.of(task=ALL_GAITS), ["condition", "agent"])
         success = {
-            condition: {agent: own.rate() for (name, agent), own in agents.items() if name == condition}
+            condition: {agent: members.rate() for (name, agent), members in agents.items() if name == condition}
             for condition in (WALKING, NOISY, TRANSITIONS)
         }
         errors = {
-            key: {agent: own.mean(key) for (name, agent), own in agents.items() if name == PHASE_ERROR}
+            key: {agent: members.mean(key) for (name, agent), members in agents.items() if name == PHASE_ERROR}
             for key in ("median", "p99")
         }
         return plots.dots({"success": success, "phase error [cycles]": errors}, log=["phase error [cycles]"])
@@ -213,8 +213,8 @@ class PhaseFree(Study):
 
 def _phase_error(members: Group) -> str:
     """Median and 99th percentile of the error of the phase."""
-    found = members.where(condition=PHASE_ERROR)
-    return f"{found[0]['median']:.3f}, {found[0]['p99']:.3f}" if found else "-"
+    errors = members.where(condition=PHASE_ERROR)
+    return f"{errors[0]['median']:.3f}, {errors[0]['p99']:.3f}" if errors else "-"
 
 
 def walk(policy: Any, options: PhaseFreeOptions, episodes: int, seed: int) -> list[dict[str, Any]]:

@@ -83,13 +83,13 @@ class Pushes(Study):
 
     def table(self, results: Results) -> str:
         gaits = distinct(results.records, "task")
-        groups = group(sorted(results.records, key=lambda own: gaits.index(own["task"])), ["task", "agent"])
+        groups = group(sorted(results.records, key=lambda record: gaits.index(record["task"])), ["task", "agent"])
         return table(groups, ["gait", ""], {f"{name} [m/s]": _largest(name) for name in DIRECTIONS})
 
     def figure(self, results: Results) -> Figure:
         panels: dict[str, dict[str, dict[str, float | None]]] = {}
         for (agent, gait), members in group(results.records, ["agent", "task"]).items():
-            largest = {own["condition"]: own["largest"] for own in members}
+            largest = {record["condition"]: record["largest"] for record in members}
             for name, pair in PAIRS.items():
                 panel = panels.setdefault(f"largest push survived, {name} [m/s]", {})
                 panel.setdefault(agent, {})[gait] = weaker(largest, pair)
@@ -100,8 +100,8 @@ def _largest(direction: str) -> Column:
     """The largest push in a direction, which may be more where the search ended."""
 
     def cell(members: Group) -> str:
-        found = members.where(condition=direction)
-        return f"{'>= ' * found[0]['at_cap']}{found[0]['largest']:.1f}" if found else "-"
+        pushed = members.where(condition=direction)
+        return f"{'>= ' * pushed[0]['at_cap']}{pushed[0]['largest']:.1f}" if pushed else "-"
 
     return cell
 

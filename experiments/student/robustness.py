@@ -79,7 +79,7 @@ class Robustness(Study):
         return levels
 
     def table(self, results: Results) -> str:
-        policies = [own for own in results.records if own["agent"] != EXPERT]
+        policies = [record for record in results.records if record["agent"] != EXPERT]
         groups = {}
         for (agent, quantity), members in group(policies, ["agent", "condition"]).items():
             middle = _middle(members)
@@ -129,7 +129,8 @@ def _survival(ax: Axes, records: Sequence[Record]) -> None:
         style, levels = styles[agent], group(members, "value")
         together = [level.rate("survived") for level in levels.values()]
         weakest = [
-            min(own.rate("survived").value for own in group(level, "task").values()) for level in levels.values()
+            min(of_gait.rate("survived").value for of_gait in group(level, "task").values())
+            for level in levels.values()
         ]
         plots.band(ax, [*levels], together, style["color"], 0.15)
         ax.plot([*levels], [r.value for r in together], **style, linewidth=2.0, marker="o", markersize=3.5, label=agent)

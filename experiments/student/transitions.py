@@ -68,8 +68,8 @@ def transition(agent: Agent, cell: Cell, options: TransitionOptions, seed: int) 
 
 def transition_rates(results: Results, key: str = "succeeded") -> dict[str, dict[tuple[str, str], Rate]]:
     """{agent: {(from, to): successes}}."""
-    found: dict[str, dict[tuple[str, str], Rate]] = {}
+    rates: dict[str, dict[tuple[str, str], Rate]] = {}
     for (agent, first, condition), members in group(results.records, ["agent", "task", "condition"]).items():
         if condition.startswith("to "):
-            found.setdefault(agent, {})[first, condition.removeprefix("to ")] = members.rate(key)
-    return found
+            rates.setdefault(agent, {})[first, condition.removeprefix("to ")] = members.rate(key)
+    return rates
