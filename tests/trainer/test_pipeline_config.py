@@ -1,6 +1,7 @@
 """Settings of the main job: what is normalized, what is refused, and what the command line makes of it."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -30,6 +31,8 @@ REFUSED = {
     "episodes": (0,),
     "video_s": (0.0,),
 }
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_numbers_of_numpy_become_pythons_and_can_be_written():
@@ -94,3 +97,8 @@ def test_what_follows_for_the_stages():
     assert config.perturbation(0.05).task_interval == (2.0, 6.0)
     assert config.with_options(tasks=("trot",)).perturbation(0.05).task_interval is None, "one gait cannot change"
     assert config.with_options(randomized=0).randomization_kwargs == {}
+
+
+def test_the_default_preset_is_the_one_whose_results_are_published():
+    published = json.loads((ROOT / "docs" / "results" / "main_job.json").read_text(encoding="utf-8"))["options"]
+    assert JobConfig.from_preset("default").as_dict() == published

@@ -100,7 +100,7 @@ class JobConfig:
     width: int = _from(1, 256)
     normalization: str = "mean_std"
     batch_size: int = _from(1, 1024)
-    clone_steps: int = _from(1, 7000)
+    clone_steps: int = _from(1, 6000)
     round_steps: int = _from(1, 2500)
     phase_free_s: float = _from(0, 240.0)
     phase_free_history: int = _from(1, 10)
