@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 
-from experiments.stats import Group, Rate
+from experiments.results import Record
+from experiments.stats import Group, Rate, group
 
 BLUE, RED, GREEN, PURPLE, YELLOW = "#2166ac", "#d6604d", "#1b9e77", "#7570b3", "#e6ab02"
 STUDENTS = (BLUE, GREEN, PURPLE, YELLOW)
@@ -87,6 +88,12 @@ def dots(panels: Mapping[str, Mapping[str, Mapping[str, Rate | float | None]]], 
     if len(names) > 1:
         legend(figure, axes)
     return figure
+
+
+def panel(records: Iterable[Record], series: str, row: str, value: Callable[[Group], Any]) -> dict[str, dict[str, Any]]:
+    """A panel of `dots`: values of one key as series, those of another as rows."""
+    of_series = group(records, series).items()
+    return {name: {label: value(each) for label, each in group(members, row).items()} for name, members in of_series}
 
 
 def _dot(ax: Axes, value: Rate | float | None, height: float, color: str, label: str) -> None:

@@ -93,13 +93,13 @@ class TrainedPolicy(PolicyFile):
     """A policy of a training run, which is made before anything is measured.
 
     Attributes:
-        run: that makes it; two agents may be of one.
+        run: a `TrainingRun`, or what else has a method `make`; two agents may be of one.
     """
 
-    run: TrainingRun = field(kw_only=True)
+    run: Any = field(kw_only=True)
 
     @property
-    def origin(self) -> TrainingRun:
+    def origin(self) -> Any:
         """The run."""
         return self.run
 

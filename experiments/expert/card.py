@@ -47,7 +47,6 @@ def _row(gait: str, measured: Mapping[str, Results]) -> list[str]:
 
     drawn = of("expert_commands", condition=ONE)
     tracked = {record["condition"]: record["tracked_to"] for record in of("expert_limits")}
-    largest = {record["condition"]: record["largest"] for record in of("expert_pushes")}
     back, forth, vy = (number(tracked.get(axis), ".1f") for axis in ("-vx", "vx", "vy"))
     return [
         gait,
@@ -56,7 +55,7 @@ def _row(gait: str, measured: Mapping[str, Results]) -> list[str]:
         f"{back}, {forth}",
         vy,
         number(tracked.get("yaw"), ".2f"),
-        *(number(weaker(largest, pair), ".1f") for pair in PAIRS.values()),
+        *(number(weaker(of("expert_pushes"), pair), ".1f") for pair in PAIRS.values()),
         count(of("expert_transitions").rate("survived")),
         number(of("expert_timing", condition=UPDATE).mean("median_ms"), ".2f"),
         number(of("expert_timing", condition=REAL_TIME, control_hz=50).mean("expert"), ".1f"),

@@ -6,10 +6,8 @@ from typing import Any
 import numpy as np
 
 from experiments.expert.lab import ExpertOptions, ExpertStudy, Lab, generator
-from experiments.results import Results
-from experiments.stats import group
 from experiments.study import option
-from experiments.tables import mean, table
+from experiments.tables import mean
 from experts import NMPCExpert
 from experts.phase_fitting import fit_phase
 from experts.robot_model import RobotModel
@@ -33,23 +31,21 @@ class Labels(ExpertStudy):
 
     name = "expert_labels"
     title = "Labels"
+    rows = {"task": "gait"}
+    columns = {
+        "states": mean("states", ".0f"),
+        "other bits when asked again": mean("asked_again", ".0f"),
+        "moved and turned [rad]": mean("displaced", ".0e"),
+        "clock wrong by 1/4 [rad]": mean("wrong_clock", ".3f"),
+        "then fitted [rad]": mean("fitted_clock", ".3f"),
+        "error of the fitted clock [cycles]": mean("phase_error", ".3f"),
+        "95 %": mean("phase_error_p95", ".3f"),
+    }
     full = LabelOptions()
     quick = LabelOptions(("trot", "jump"), walks=1, seconds=1.5)
 
     def measure_in(self, lab: Lab, task: str, seed: int) -> list[dict[str, Any]]:
         return [labels(lab, task, self.options, seed)]
-
-    def table(self, results: Results) -> str:
-        columns = {
-            "states": mean("states", ".0f"),
-            "other bits when asked again": mean("asked_again", ".0f"),
-            "moved and turned [rad]": mean("displaced", ".0e"),
-            "clock wrong by 1/4 [rad]": mean("wrong_clock", ".3f"),
-            "then fitted [rad]": mean("fitted_clock", ".3f"),
-            "error of the fitted clock [cycles]": mean("phase_error", ".3f"),
-            "95 %": mean("phase_error_p95", ".3f"),
-        }
-        return table(group(results.records, "task"), ["gait"], columns)
 
 
 def labels(lab: Lab, task: str, options: LabelOptions, seed: int) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from experiments.pushing import CRUISE
 from experiments.results import Results
 from experiments.stats import group
 from experiments.study import option
-from experiments.tables import markdown, mean, share, table
+from experiments.tables import markdown, mean, share
 from experts import NMPCConfig, NMPCExpert
 from experts.nmpc import WHOLE_BODY
 from go1_mtl_gym.actuation import PHYSICS_HZ
@@ -203,6 +203,12 @@ class Settings(ExpertStudy):
 
     name = "expert_settings"
     title = "Settings compared"
+    rows = {"task": "gait", "agent": "settings"}
+    columns = {
+        "survived": share("survived"),
+        "velocity error [m/s]": mean("velocity_error", ".3f"),
+        "push to the side [m/s]": mean("lateral_push", ".1f"),
+    }
     full = SettingsOptions()
     quick = SettingsOptions(("trot",), 50, 1, 2.5, PushOptions(phases=1, grid=0, after_s=0.5, directions=("left",)))
     code = (*ExpertStudy.code, "experiments.pushing", "experiments.searches")
@@ -221,12 +227,3 @@ class Settings(ExpertStudy):
     def measure_in(self, lab: Lab, task: str, seed: int) -> list[dict[str, Any]]:
         raise NotImplementedError
 
-    def table(self, results: Results) -> str:
-        columns = {
-            "survived": share("survived"),
-            "velocity error [m/s]": mean("velocity_error", ".3f"),
-            "push to the side [m/s]": mean("lateral_push", ".1f"),
-        }
-        tasks = list(group(results.records, "task"))
-        records = sorted(results.records, key=lambda record: tasks.index(record["task"]))
-        return table(group(records, ["task", "agent"]), ["gait", "settings"], columns)
