@@ -14,31 +14,13 @@ from experiments.agents import policy_files
 from experiments.catalog import STUDIES, study_class
 from experiments.plots import save_figure
 from experiments.publish import publish_command
-from experiments.results import Results
+from experiments.results import Results, without_folders
 from experiments.running import run
 from experiments.study import CACHE, Study
 from go1_mtl_gym.validation import number_in
 from trainers.utils import cli
 
 OUT = CACHE / "results"
-FOLDERS = ("--out", "--cache")
-"""Options that say where files go on this machine."""
-CHECKOUTS = ("--go2-convex-mpc",)
-"""Options whose value is a path of this machine."""
-
-
-def without_folders(arguments: list[str]) -> str:
-    """The command of these arguments, without what only its machine knows."""
-    words, kept = iter(arguments), []
-    for word in words:
-        name, given, _ = word.partition("=")
-        if name in (*FOLDERS, *CHECKOUTS):
-            if not given:
-                next(words, None)
-            kept += [name, "PATH"] if name in CHECKOUTS else []
-        else:
-            kept.append(word)
-    return shlex.join(["python", "-m", "experiments", *kept])
 
 
 def summary_line(study: type[Study]) -> str:
@@ -99,7 +81,7 @@ def run_command(name: str, arguments: list[str]) -> None:
     study_class(name)
     options = study_parser(name).parse_args(arguments)
     study = study_of(name, options)
-    command = without_folders(["run", name, *arguments])
+    command = without_folders(shlex.join(["python", "-m", "experiments", "run", name, *arguments]))
     try:
         results = run(study, options.seed, options.n_jobs, command, options.only)
     except KeyboardInterrupt as interrupt:

@@ -31,6 +31,27 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
+def grid(
+    count: int, columns: int, panel: tuple[float, float], margin: tuple[float, float], **options: Any
+) -> tuple[Figure, np.ndarray]:
+    """A figure and its axes, at most so many side by side; those that are not needed are hidden.
+
+    Args:
+        count: of panels.
+        columns: at most.
+        panel: width and height of each [inch].
+        margin: width and height of what is around them [inch].
+        **options: of `Figure.subplots`.
+    """
+    columns = max(1, min(columns, count))
+    rows = max(1, math.ceil(count / columns))
+    figure = new_figure(panel[0] * columns + margin[0], panel[1] * rows + margin[1])
+    axes = figure.subplots(rows, columns, squeeze=False, **options)
+    for ax in axes.flat[count:]:
+        ax.set_axis_off()
+    return figure, axes
+
+
 def save_figure(figure: Figure, path: Path) -> Path:
     """Write a figure, equal ones to equal bytes; returns the file."""
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -4,7 +4,6 @@ Nothing in them is typed by hand; ``--check`` fails when what is committed is ou
 """
 
 import argparse
-import shlex
 import shutil
 from dataclasses import dataclass
 from importlib import import_module
@@ -13,7 +12,7 @@ from pathlib import Path
 from experiments import main_job
 from experiments.catalog import STUDIES, study_class
 from experiments.plots import save_figure
-from experiments.results import Results, read_json
+from experiments.results import Results, read_json, without_folders
 from experiments.tables import markdown
 from go1_mtl_gym.errors import InvalidInputError
 from trainers.utils.files import write_atomically
@@ -178,24 +177,13 @@ def copy_run(run: Path, root: Path) -> None:
     preset = metrics.get("config", {}).get("preset")
     if preset != PUBLISHED_PRESET:
         raise InvalidInputError(f"a run of the preset {PUBLISHED_PRESET!r} was expected, {run} is one of {preset!r}")
-    results = main_job.results_of(metrics, without_out(metrics.get("command", "")))
+    results = main_job.results_of(metrics, without_folders(metrics.get("command", "")))
     results.write(folder / f"{main_job.NAME}.json")
     for name in COPIED:
         shutil.copyfile(run / name, folder / name)
     assets.mkdir(parents=True, exist_ok=True)
     for name, published in POLICIES.items():
         shutil.copyfile(run / name, assets / published)
-
-
-def without_out(command: str) -> str:
-    """A command without its option ``--out``."""
-    words, kept = iter(shlex.split(command)), []
-    for word in words:
-        if word == "--out":
-            next(words, None)
-        elif not word.startswith("--out="):
-            kept.append(word)
-    return shlex.join(kept)
 
 
 def publish_command(arguments: list[str], root: Path = ROOT) -> None:

@@ -3,16 +3,15 @@
 import json
 import os
 import platform
+import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from experiments.stats import Group, Record
 from go1_mtl_gym.errors import InvalidInputError
 from trainers.utils.files import json_ready, write_atomically
-
-Record = dict[str, Any]
-"""{"study", "agent", "task", "condition", "seed", metrics ...}."""
 
 
 @dataclass(frozen=True)
@@ -82,9 +81,9 @@ class Results:
         seconds = {name: earlier.seconds.get(name, 0.0) + value for name, value in self.seconds.items()}
         return replace(self, records=(*kept, *self.records), command=command, seconds=seconds)
 
-    def of(self, **values: Any) -> list[Record]:
+    def of(self, **values: Any) -> Group:
         """The records that have these values, in their order."""
-        return [record for record in self.records if all(record.get(name) == v for name, v in values.items())]
+        return Group(self.records).where(**values)
 
 
 def read_json(path: Path) -> dict[str, Any]:
@@ -102,6 +101,24 @@ def read_json(path: Path) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise InvalidInputError(f"{path} must hold a JSON object, got {type(value).__name__}")
     return value
+
+
+FOLDERS, CHECKOUTS = ("--out", "--cache"), ("--go2-convex-mpc",)
+"""Options that say where files go on this machine, and whose value is a path of this machine."""
+
+
+def without_folders(command: str) -> str:
+    """A command without what only its machine knows."""
+    words, kept = iter(shlex.split(command)), []
+    for word in words:
+        name, given, _ = word.partition("=")
+        if name in (*FOLDERS, *CHECKOUTS):
+            if not given:
+                next(words, None)
+            kept += [name, "PATH"] if name in CHECKOUTS else []
+        else:
+            kept.append(word)
+    return shlex.join(kept)
 
 
 def distinct(records: Iterable[Record], key: str) -> list[Any]:

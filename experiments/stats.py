@@ -6,9 +6,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import stats
-from scipy.stats import binomtest
 
-from experiments.results import Record
+from trainers.evaluation.metrics import wilson_interval
+
+Record = dict[str, Any]
+"""{"study", "agent", "task", "condition", "seed", metrics ...}."""
+Z_95 = float(stats.norm.ppf(0.975))
+"""Of two-sided 95 % intervals."""
 
 
 class Rate(NamedTuple):
@@ -25,10 +29,7 @@ class Rate(NamedTuple):
     @property
     def interval(self) -> tuple[float, float]:
         """Lower and upper bound."""
-        if not self.trials:
-            return math.nan, math.nan
-        bounds = binomtest(self.successes, self.trials).proportion_ci(0.95, method="wilson")
-        return float(bounds.low), float(bounds.high)
+        return wilson_interval(self.successes, self.trials, Z_95) if self.trials else (math.nan, math.nan)
 
 
 class Estimate(NamedTuple):

@@ -43,7 +43,7 @@ def card(measured: Mapping[str, Results]) -> list[str]:
 
 def _row(gait: str, measured: Mapping[str, Results]) -> list[str]:
     def of(study: str, **values: Any) -> Group:
-        return Group(measured[study].of(task=gait, **values)) if study in measured else Group()
+        return measured[study].of(task=gait, **values) if study in measured else Group()
 
     drawn = of("expert_commands", condition=ONE)
     tracked = {record["condition"]: record["tracked_to"] for record in of("expert_limits")}

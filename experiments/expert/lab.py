@@ -10,7 +10,7 @@ import numpy as np
 
 import experts
 import trainers
-from experiments.agents import Agent, Expert
+from experiments.agents import EXPERT, Agent
 from experiments.study import Cell, Metrics, Study, option
 from go1_mtl_gym import TASKS
 from go1_mtl_gym.env import Go1Env
@@ -199,15 +199,12 @@ class ExpertStudy(Study):
     code: ClassVar[tuple[str, ...]] = ("go1_mtl_gym", "experts", "trainers.evaluation", "experiments.expert")
 
     def agents(self) -> list[Agent]:
-        """The expert."""
-        return [Expert()]
+        return [Agent(EXPERT)]
 
     def cells(self, agent: Agent) -> list[Cell]:
-        """The gaits."""
         return [Cell(task) for task in self.options.tasks]
 
     def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:
-        """Measure in a lab of its own."""
         lab = Lab(self.options.control_hz)
         records = self.measure_in(lab, cell.task, seed)
         records[0] |= dataclasses.asdict(lab.settle())

@@ -12,6 +12,7 @@ from experts import NMPCExpert
 from experts.phase_fitting import fit_phase
 from experts.robot_model import RobotModel
 from go1_mtl_gym import TASKS
+from go1_mtl_gym.rotations import yaw_matrix
 from go1_mtl_gym.sensing.state import RobotState
 
 
@@ -98,19 +99,12 @@ def _states(lab: Lab, task: str, options: LabelOptions, seed: int) -> list[Robot
 def _displaced(state: RobotState, rng: np.random.Generator, distance: float) -> RobotState:
     """The same robot somewhere else, facing another way."""
     yaw = rng.uniform(-np.pi, np.pi)
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    turn = yaw_matrix(yaw)
     w, x, y, z = state.quat_wxyz
-    half_cos, half_sin = np.cos(yaw / 2), np.sin(yaw / 2)
-    quat = [
-        half_cos * w - half_sin * z,
-        half_cos * x - half_sin * y,
-        half_cos * y + half_sin * x,
-        half_cos * z + half_sin * w,
-    ]
+    quat = np.cos(yaw / 2) * state.quat_wxyz + np.sin(yaw / 2) * np.array([-z, -y, x, w])
     return replace(
         state,
         position_w=turn @ state.position_w + np.array([*rng.uniform(-distance, distance, 2), 0.0]),
-        quat_wxyz=np.array(quat),
+        quat_wxyz=quat,
         linear_velocity_w=turn @ state.linear_velocity_w,
     )

@@ -64,17 +64,12 @@ class Steady(ExpertStudy):
 
     def figure(self, results: Results) -> Figure:
         known = [record for record in results.records if "schedule" in record]
-        columns = 2 if len(known) > 1 else 1
-        rows = max(1, -(-len(known) // columns))
-        figure = plots.new_figure(4.4 * columns + 0.3, 1.55 * rows + 0.6)
-        axes = figure.subplots(rows, columns, squeeze=False).ravel()
-        for ax, record in zip(axes, known):
+        figure, axes = plots.grid(len(known), 2, (4.4, 1.55), (0.3, 0.6))
+        for ax, record in zip(axes.flat, known):
             _contacts(ax, record)
-        for ax in axes[len(known) :]:
-            ax.set_axis_off()
-        for ax in axes[max(0, len(known) - columns) : len(known)]:
+        for ax in axes.flat[max(0, len(known) - axes.shape[1]) : len(known)]:
             ax.set_xlabel("gait clock [cycles]", fontsize=9)
-        plots.legend(figure, axes[:1])
+        plots.legend(figure, axes.flat[:1])
         return figure
 
 

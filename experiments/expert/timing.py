@@ -226,4 +226,3 @@ class Settings(ExpertStudy):
 
     def measure_in(self, lab: Lab, task: str, seed: int) -> list[dict[str, Any]]:
         raise NotImplementedError
-

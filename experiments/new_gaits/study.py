@@ -159,10 +159,10 @@ class NewGaits(Study):
                 members = Group(record for level in levels.values() for record in level)
                 error = number(last.mean("velocity_error"), ".3f")
                 all_survive = "-" if least is None else f"{least:g} s"
-                rows.append([gait, method, *cells, all_survive, error, old_cell(members, Group(after))])
+                rows.append([gait, method, *cells, all_survive, error, old_cell(members, after)])
         header = ["gait", "learned", *budgets, "all survive from", "velocity error [m/s]", "old gaits"]
         expert = [f"{count(Group([record]).rate())} of {record['task']}" for record in results.of(agent=EXPERT)]
-        before = count(Group(results.of(agent=BEFORE)).rate())
+        before = count(results.of(agent=BEFORE).rate())
         return "\n\n".join(
             [
                 markdown(header, rows, text_columns=2),

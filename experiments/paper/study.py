@@ -122,9 +122,8 @@ class PaperStudy(Study):
         curves = [record for record in results.of(condition=CURVE) if record["agent"] in colors]
         widths = sorted({record["width"] for record in curves}, reverse=True)
         per_gait = group(curves, "task")
-        figure = plots.new_figure(3.3 * max(1, len(per_gait)) + 0.4, 3.2)
-        axes = figure.subplots(1, max(1, len(per_gait)), squeeze=False, sharey=True)[0]
-        for ax, (gait, members) in zip(axes, per_gait.items()):
+        figure, axes = plots.grid(len(per_gait), len(per_gait), (3.3, 3.2), (0.4, 0.0), sharey=True)
+        for ax, (gait, members) in zip(axes.flat, per_gait.items()):
             for record in members:
                 style = styles[min(widths.index(record["width"]), len(styles) - 1)]
                 label = f"{KINDS[record['agent']]}, {record['width']} wide"
@@ -134,8 +133,8 @@ class PaperStudy(Study):
             ax.set_title(gait, fontsize=10)
             ax.set_xlabel("gradient steps", fontsize=9)
             ax.tick_params(labelsize=8)
-        axes[0].set_ylabel("held-out MSE [rad²]", fontsize=9)
-        plots.legend(figure, axes)
+        axes[0, 0].set_ylabel("held-out MSE [rad²]", fontsize=9)
+        plots.legend(figure, axes.flat)
         return figure
 
     def more_figures(self) -> dict[str, Figure]:

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 import trainers
 from experiments import plots
-from experiments.agents import EXPERT, STUDENT, Agent, Expert, shipped, tasks_of, with_expert
+from experiments.agents import EXPERT, STUDENT, Agent, shipped, tasks_of, with_expert
 from experiments.results import Record, Results, distinct
 from experiments.stats import group
 from experiments.student.episodes import counts
@@ -70,7 +70,7 @@ class Robustness(Study):
         options, policy = self.options, agent.load()
         levels = []
         for value in QUANTITIES[cell.condition][1][:: options.every]:
-            kwargs = {**agent.env_kwargs, **world(cell.condition, value, isinstance(agent, Expert))}
+            kwargs = {**agent.env_kwargs, **world(cell.condition, value, agent.name == EXPERT)}
             interval = options.command_interval
             result = trainers.evaluate(
                 policy, cell.task, options.episodes, options.seconds, seed, command_interval=interval, **kwargs
@@ -89,16 +89,11 @@ class Robustness(Study):
 
     def figure(self, results: Results) -> Figure:
         shown = [name for name in QUANTITIES if name in distinct(results.records, "condition")]
-        columns = min(4, len(shown))
-        rows = -(-len(shown) // columns)
-        figure = plots.new_figure(2.9 * columns + 0.4, 2.15 * rows + 0.5)
-        axes = figure.subplots(rows, columns, sharey=True, squeeze=False)
+        figure, axes = plots.grid(len(shown), 4, (2.9, 2.15), (0.4, 0.5), sharey=True)
         for ax, quantity in zip(axes.flat, shown):
             _survival(ax, results.of(condition=quantity))
             ax.set_xlabel(QUANTITIES[quantity][0], fontsize=9)
             ax.tick_params(labelsize=8)
-        for ax in axes.flat[len(shown) :]:
-            ax.set_axis_off()
         for ax in axes[:, 0]:
             ax.set_ylabel("survival", fontsize=9)
         plots.legend(figure, axes.flat[:1])
