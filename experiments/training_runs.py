@@ -22,6 +22,20 @@ UNUSED = ("preset", "n_envs", "device", "threads", "episodes", "video_s")
 HELD_OUT = "held_out.json"
 """File of the one-step errors on held-out rows, and of the time; the last that a run writes."""
 
+QUICK_JOB = {
+    "tasks": ("trot", "bound"),
+    "width": 64,
+    "batch_size": 256,
+    "shard_s": 2.0,
+    "clean_s": 2.0,
+    "perturbed_s": 2.0,
+    "held_out_s": 2.0,
+    "clone_steps": 60,
+    "episodes": 1,
+    "episode_s": 2.5,
+}
+"""Settings of the main job where a quick run of a study trains with some of its parts."""
+
 
 @dataclass(frozen=True)
 class TrainingRun:

@@ -139,7 +139,7 @@ def interleaved(calls: dict[str, Callable[[RobotState], Any]], states: Sequence[
     return times
 
 
-def quantiles(seconds: np.ndarray) -> dict[str, float]:
+def quantiles(seconds: Sequence[float] | np.ndarray) -> dict[str, float]:
     """Median and 99th percentile in milliseconds."""
     return {"median_ms": float(1e3 * np.median(seconds)), "p99_ms": float(1e3 * np.quantile(seconds, 0.99))}
 

@@ -13,10 +13,10 @@ from experiments import plots
 from experiments.agents import Agent
 from experiments.results import Results
 from experiments.stats import Group, drops, group
-from experiments.student.episodes import counts
+from experiments.student.episodes import counts, evaluate_gaits
 from experiments.study import ALL_GAITS, Cell, Metrics, Study, option
 from experiments.tables import markdown, number, percent
-from experiments.training_runs import collect, kept_policy, rows_of
+from experiments.training_runs import QUICK_JOB, collect, kept_policy, rows_of
 from go1_mtl_gym.errors import InvalidInputError
 from trainers.pipeline.config import NOISE_RAD, ROUND_NOISE_RAD, JobConfig
 from trainers.pipeline.demonstrations import shard_jobs
@@ -88,18 +88,6 @@ class BudgetOptions:
         return shard_jobs(job, seconds, int(perturbed), job.perturbation(self.noise_rad) if perturbed else None)
 
 
-QUICK_JOB = replace(
-    BudgetOptions().job,
-    tasks=("trot", "bound"),
-    width=64,
-    batch_size=256,
-    shard_s=2.0,
-    clone_steps=60,
-    episodes=1,
-    episode_s=2.5,
-)
-
-
 class Budget(Study):
     """DAgger against cloning with equally many labels: five ways to ask for them."""
 
@@ -113,7 +101,7 @@ class Budget(Study):
     )
     caption = "Survival, success and falls over labels, of five ways to ask for them"
     full = BudgetOptions()
-    quick = BudgetOptions(QUICK_JOB, budgets_s=(2.0, 4.0), seeds=(0,))
+    quick = BudgetOptions(replace(BudgetOptions().job, **QUICK_JOB), budgets_s=(2.0, 4.0), seeds=(0,))
     code = (*Study.code, "experiments.training_runs")
 
     def agents(self) -> list[Agent]:
@@ -135,14 +123,9 @@ class Budget(Study):
             Counts per budget and gait, and of all gaits together; these with "falls" while collecting the labels, and
             the "learner_fraction" of the steps meanwhile that the learner drove.
         """
-        job, records = self.options.job, []
+        records: list[dict[str, Any]] = []
         for labels_s, policy, collecting in Trainings(METHODS[agent.name], self.options, cell.seed, self.folder):
-            results = {
-                task: trainers.evaluate(
-                    policy, task, job.episodes, job.episode_s, seed, command_interval=job.command_interval
-                )
-                for task in job.tasks
-            }
+            results = evaluate_gaits(policy, self.options.job, seed)
             together = counts(*results.values()) | collecting
             per_gait = [{"task": task, "labels_s": labels_s, **counts(result)} for task, result in results.items()]
             records += [{"labels_s": labels_s, **together}, *per_gait]

@@ -197,7 +197,7 @@ def test_a_verdict_needs_every_metric():
 TINY_GAITS = dataclasses.replace(
     new_gaits.NewGaits.quick,
     job=dataclasses.replace(
-        new_gaits.QUICK_JOB, width=16, shard_s=1.0, held_out_s=1.0, clone_steps=5, episode_s=0.5, batch_size=32
+        new_gaits.NewGaits.quick.job, width=16, shard_s=1.0, held_out_s=1.0, clone_steps=5, episode_s=0.5, batch_size=32
     ),
     demonstrations_s=(1.0, 2.0),
     rehearsal_s=1.0,

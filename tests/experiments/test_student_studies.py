@@ -46,7 +46,7 @@ def results(records, **values) -> Results:
 def saved(tmp_path_factory):
     """Files of two small untrained policies with different gains; the second was trained in another world."""
     folder = tmp_path_factory.mktemp("policies")
-    job = phase_free.QUICK_JOB
+    job = phase_free.PhaseFree.quick.job
     for name, kp in (("a", 50.0), ("b", 40.0)):
         own = dataclasses.replace(job, kp=kp, width=8, history=1)
         policy = new_policy(own, own.env_kwargs)
@@ -236,7 +236,7 @@ def test_a_variants_gaits_are_taken_together():
 
 TINY_BUDGET = dataclasses.replace(
     budget.Budget.quick,
-    job=dataclasses.replace(budget.QUICK_JOB, tasks=("trot",), shard_s=1.0, clone_steps=5, episode_s=0.5),
+    job=dataclasses.replace(budget.Budget.quick.job, tasks=("trot",), shard_s=1.0, clone_steps=5, episode_s=0.5),
     budgets_s=(1.0, 2.0, 4.0),
 )
 
@@ -290,7 +290,7 @@ def test_who_drove_and_fell_is_counted_and_finished_policies_are_read(tmp_path):
 
 # -- Without a clock ---------------------------------------------------------------------------------------------------
 
-TINY_JOB = dataclasses.replace(phase_free.QUICK_JOB, clean_s=1.0, perturbed_s=1.0, shard_s=1.0, clone_steps=3)
+TINY_JOB = dataclasses.replace(phase_free.PhaseFree.quick.job, clean_s=1.0, perturbed_s=1.0, shard_s=1.0, clone_steps=3)
 TURNS = np.array([0.0, 0.1, 0.25, 0.7, 0.95])
 
 
