@@ -70,13 +70,9 @@ class Group(tuple[Record, ...]):
         known = self.values(key)
         return max(known) if self and len(known) == len(self) else None
 
-    def estimate(self, key: str) -> Estimate:
-        """Mean with its 95 % interval by Student's t: half width t_{.975, n-1} s / sqrt(n), with s over n - 1."""
-        return estimate(self.values(key))
-
 
 def estimate(values: Sequence[float]) -> Estimate:
-    """See `Group.estimate`."""
+    """Mean with its 95 % interval by Student's t: half width t_{.975, n-1} s / sqrt(n), with s over n - 1."""
     n = len(values)
     mean = float(np.mean(values)) if n else math.nan
     if n < 2:

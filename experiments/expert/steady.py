@@ -139,15 +139,15 @@ def _rollout(
     lab: Lab, task: str, command: np.ndarray, options: SteadyOptions, seed: int, schedule: bool = False
 ) -> dict[str, Any]:
     lab.begin(task, command, "steady", seed)
-    calls, iterations = lab.settle().calls, lab.ledger.iterations
+    before = dict(lab.settle())
     with Recorder(lab) as recorder:
         survived = lab.walk(options.seconds)
-    ledger, gait = lab.settle(), TASKS[task].gait
+    made, gait = {name: count - before[name] for name, count in lab.settle().items()}, TASKS[task].gait
     series = recorder.series(options.skip_s)
     metrics = {
         "command": command,
         "survived": survived,
-        "qp_iterations": (ledger.iterations - iterations) / max(1, ledger.calls - calls),
+        "qp_iterations": made["iterations"] / max(1, made["calls"]),
     }
     if len(series["phase"]) < gait.period * PHYSICS_HZ:
         return metrics

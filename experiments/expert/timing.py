@@ -74,7 +74,7 @@ class Timing(ExpertStudy):
         calls |= {name: other.counted.action for name, other in labs.items()}
         times = {name: quantiles(seconds) for name, seconds in interleaved(calls, states).items()}
         for other in labs.values():
-            lab.ledger.add(other.settle())
+            lab.ledger.update(other.settle())
         return [
             *({"condition": name, **times[name]} for name in (UPDATE, ACTION)),
             *({"agent": name, "condition": COMPARED_ACTION, **times[name]} for name in labs),
@@ -176,7 +176,7 @@ def real_time(lab: Lab, task: str, rate: int, options: TimingOptions, seed: int)
     calls = {"expert": expert, "environment": environment, "physics": physics}
     blocks = [{name: elapsed(call) for name, call in calls.items()} for _ in range(options.blocks)]
     factors = {name: float(options.block_s / np.median([block[name] for block in blocks])) for name in calls}
-    lab.ledger.add(walking.settle())
+    lab.ledger.update(walking.settle())
     return {"control_hz": rate} | factors | {"expert_to_physics": factors["expert"] / factors["physics"]}
 
 
@@ -222,7 +222,7 @@ class Settings(ExpertStudy):
         pushes = [largest_push(lab, cell.task, direction, options.push, seed) for direction in options.push.directions]
         survived = sum(not episode.fallen for episode in walked.episodes)
         counts = {"trials": options.episodes, "survived": survived, "velocity_error": walked.velocity_error}
-        return counts | {"lateral_push": min(pushes)} | vars(lab.settle())
+        return counts | {"lateral_push": min(pushes)} | dict(lab.settle())
 
     def measure_in(self, lab: Lab, task: str, seed: int) -> list[dict[str, Any]]:
         raise NotImplementedError

@@ -127,13 +127,13 @@ class NewGaits(Study):
         return [record, *(walked | about for walked in self._walk(policy, base.tasks, options.old_episodes, seed))]
 
     def _walk(
-        self, policy: Any, tasks: tuple[str, ...], episodes: int, seed: int, **env_kwargs: Any
+        self, policy: Any, gaits: tuple[str, ...], episodes: int, seed: int, **env_kwargs: Any
     ) -> list[dict[str, Any]]:
         """A record per gait of episodes under commands that change."""
-        walked = evaluate_gaits(policy, replace(self.options.job, tasks=tasks, episodes=episodes), seed, **env_kwargs)
+        walked = evaluate_gaits(policy, replace(self.options.job, tasks=gaits, episodes=episodes), seed, **env_kwargs)
         return [
-            {"task": task, **counts(result), "survival_s": result.survival_s, "step_rate": result.step_rate}
-            for task, result in walked.items()
+            {"task": gait, **counts(result), "survival_s": result.survival_s, "step_rate": result.step_rate}
+            for gait, result in walked.items()
         ]
 
     def table(self, results: Results) -> str:

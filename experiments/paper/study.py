@@ -16,7 +16,7 @@ from experiments.paper.networks import Network, account, held_out
 from experiments.paper.published import KINDS, METRICS, MULTI_HEAD, PER_GAIT, POOLED, PUBLISHED, TARGETS
 from experiments.paper.settings import NAMED, TRAIN, UNSEEN, PaperOptions, Table, shard_jobs
 from experiments.results import Record, Results
-from experiments.stats import Group, group
+from experiments.stats import Group, estimate, group
 from experiments.study import ALL_GAITS, Cell, Metrics, Study
 from experiments.tables import estimated, markdown, number
 from experiments.training_runs import collect
@@ -206,7 +206,7 @@ def score_table(name: str, results: Results, use: str, paper: bool) -> str:
             cells = [number(metrics.get(key), DIGITS[key]) for key in SHOWN]
             rows.append([gait, f"paper, {PAPERS_KINDS[kind]}", "-", "2560", "-", "-", *cells])
         for learner, members in scores(results, gait, use).items():
-            cells = [estimated(members.estimate(key), DIGITS[key]) for key in SHOWN]
+            cells = [estimated(estimate(members.values(key)), DIGITS[key]) for key in SHOWN]
             about = [learner.precision, str(learner.width), str(learner.steps), str(len(members))]
             rows.append([gait, KINDS[learner.kind], *about, *cells])
     header = ["gait", "learner", "trained in", "width", "steps", "seeds", *SHOWN.values()]
@@ -278,7 +278,7 @@ def summary(measured: Mapping[str, Results]) -> list[str]:
             metrics = scores(results, gait, uses(results)[0])
             for way in dict.fromkeys(learner[:3] for learner in metrics):
                 ranked = [metrics.get(Learner(*way, rank)) for rank in range(len(KINDS))]
-                ours = ["-" if members is None else estimated(members.estimate("r2"), ".4f") for members in ranked]
+                ours = [estimated(estimate(members.values("r2")), ".4f") if members else "-" for members in ranked]
                 rows.append([data.replace("_", " "), gait, *theirs, ", ".join(map(str, way)), *ours])
     theirs = [f"{PAPERS_KINDS[kind]}, paper" for kind in (MULTI_HEAD, POOLED)]
     header = ["data", "gait", *theirs, "width, steps, trained in", *(f"{kind}, here" for kind in KINDS.values())]

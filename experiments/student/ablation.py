@@ -5,13 +5,12 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-import trainers
 from experiments import plots
 from experiments.agents import Agent
 from experiments.results import Results, distinct
 from experiments.stats import Group, group
 from experiments.student.commanded import DRAWN
-from experiments.student.episodes import counts, other_gaits
+from experiments.student.episodes import drawn, other_gaits
 from experiments.student.transitions import TransitionOptions, transition
 from experiments.study import EVALUATION_CODE, Cell, Metrics, Study, option
 from experiments.tables import count, mean, settings, share, table
@@ -121,16 +120,9 @@ class Ablation(Study):
             return dict(agent.origin.held_out[cell.task])
         if cell.condition not in (DRAWN, CHANGED):
             return transition(agent, cell, options.transitions, seed)
-        result = trainers.evaluate(
-            agent.load(),
-            cell.task,
-            options.episodes if cell.condition == DRAWN else options.changed_episodes,
-            options.seconds,
-            seed,
-            command_interval=options.command_interval,
-            **(CHANGED_WORLD if cell.condition == CHANGED else {}),
-        )
-        return counts(result)
+        if cell.condition == CHANGED:
+            return drawn(agent.load(), cell.task, options.changed_episodes, options, seed, **CHANGED_WORLD)
+        return drawn(agent.load(), cell.task, options.episodes, options, seed)
 
     def more(self) -> dict[str, Any]:
         return {"training": {name: changed(self.options.job(name)) for name in self.options.variants}}

@@ -5,12 +5,11 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-import trainers
 from experiments import plots
 from experiments.agents import EXPERT, PHASE_FREE, SHARED, STUDENT, Agent
 from experiments.results import Results
 from experiments.stats import Group, Rate, group
-from experiments.student.episodes import counts
+from experiments.student.episodes import drawn
 from experiments.student.phase import with_correction
 from experiments.study import EVALUATION_CODE, Cell, Metrics, Study, option
 from experiments.tables import count, judged, markdown, number
@@ -77,17 +76,10 @@ class Commanded(Study):
         if cell.condition == CORRECTED:
             policy = with_correction(policy, options.correction)
         episodes = options.corner_episodes if cell.condition == CORNERS else options.episodes
-        result = trainers.evaluate(
-            policy,
-            cell.task,
-            options.phase_free_episodes if agent.name == PHASE_FREE else episodes,
-            options.seconds,
-            seed,
-            command_interval=options.command_interval,
-            corners=cell.condition == CORNERS,
-            **agent.env_kwargs,
-        )
-        return counts(result)
+        if agent.name == PHASE_FREE:
+            episodes = options.phase_free_episodes
+        corners = cell.condition == CORNERS
+        return drawn(policy, cell.task, episodes, options, seed, corners=corners, **agent.env_kwargs)
 
     def more(self) -> dict[str, Any]:
         return {"targets": TARGETS, "training": changed(self.options.job)}

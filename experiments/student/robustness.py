@@ -7,12 +7,11 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-import trainers
 from experiments import plots
 from experiments.agents import EXPERT, STUDENT, Agent, shipped, tasks_of, with_expert
 from experiments.results import Record, Results, distinct
 from experiments.stats import group
-from experiments.student.episodes import counts
+from experiments.student.episodes import drawn
 from experiments.study import EVALUATION_CODE, Cell, Metrics, Study, option
 from experiments.tables import Column, share, table
 from go1_mtl_gym.sensing.observation import SensorNoise
@@ -67,15 +66,10 @@ class Robustness(Study):
         return [Cell(task, quantity) for task in tasks_of(agent) for quantity in self.options.quantities]
 
     def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:
-        options, policy = self.options, agent.load()
-        levels = []
+        options, policy, levels = self.options, agent.load(), []
         for value in QUANTITIES[cell.condition][1][:: options.every]:
             kwargs = {**agent.env_kwargs, **world(cell.condition, value, agent.name == EXPERT)}
-            interval = options.command_interval
-            result = trainers.evaluate(
-                policy, cell.task, options.episodes, options.seconds, seed, command_interval=interval, **kwargs
-            )
-            levels.append({"value": value, **counts(result)})
+            levels.append({"value": value, **drawn(policy, cell.task, options.episodes, options, seed, **kwargs)})
         return levels
 
     def table(self, results: Results) -> str:
