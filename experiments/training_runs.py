@@ -14,6 +14,7 @@ from experiments.study import TRAINING_CODE, code_digest, digest
 from trainers.algorithms.optimizer import torch_threads
 from trainers.pipeline.config import JobConfig
 from trainers.pipeline.job import Job
+from trainers.pipeline.new_policy import new_policy
 from trainers.policies.checkpoint import versions
 from trainers.utils.files import write_json
 
@@ -82,10 +83,12 @@ class TrainingRun:
         """
         if not (self.folder / HELD_OUT).is_file():
             self.folder.mkdir(parents=True, exist_ok=True)
-            with open(self.folder / "progress.log", "a", encoding="utf-8") as log, contextlib.ExitStack() as stack:
-                stack.enter_context(torch_threads(1))
-                stack.enter_context(contextlib.redirect_stderr(log))
-                stack.enter_context(contextlib.redirect_stdout(log))
+            with (
+                open(self.folder / "progress.log", "a", encoding="utf-8") as log,
+                torch_threads(1),
+                contextlib.redirect_stderr(log),
+                contextlib.redirect_stdout(log),
+            ):
                 self._train()
         return self._finished()["seconds"]
 
@@ -139,6 +142,13 @@ def rows_of(jobs: Sequence[trainers.CollectJob], folder: Path) -> trainers.Demon
     """The rows of some demonstrations; those that are not in the folder yet are made."""
     paths = trainers.collect_all(jobs, folder / "demonstrations")
     return trainers.Demonstrations.concatenate([trainers.Demonstrations.load(path) for path in paths])
+
+
+def cloned(job: JobConfig, rows: trainers.Demonstrations) -> trainers.MultiHeadPolicy:
+    """A new policy of a job that has learned from some rows by behavior cloning."""
+    policy = new_policy(job, job.env_kwargs)
+    trainers.train_bc(policy, rows, job.bc)
+    return policy
 
 
 def kept_policy(path: Path, train: Callable[[], Any]) -> Any:

@@ -161,10 +161,6 @@ def real_time(lab: Lab, task: str, rate: int, options: TimingOptions, seed: int)
     simulation, steps = standing.env.simulation, round(options.block_s * rate)
     home = standing.env.action_map.from_radians(simulation.q)
 
-    def expert() -> None:
-        for _ in walking.drive(options.block_s):
-            pass
-
     def environment() -> None:
         for _ in range(steps):
             standing.env.step(home)
@@ -173,7 +169,7 @@ def real_time(lab: Lab, task: str, rate: int, options: TimingOptions, seed: int)
         for _ in range(steps):
             mujoco.mj_step(simulation.model, simulation.data, nstep=PHYSICS_HZ // rate)
 
-    calls = {"expert": expert, "environment": environment, "physics": physics}
+    calls = {"expert": partial(walking.walk, options.block_s), "environment": environment, "physics": physics}
     blocks = [{name: elapsed(call) for name, call in calls.items()} for _ in range(options.blocks)]
     factors = {name: float(options.block_s / np.median([block[name] for block in blocks])) for name in calls}
     lab.ledger.update(walking.settle())

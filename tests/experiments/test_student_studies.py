@@ -242,7 +242,7 @@ TINY_BUDGET = dataclasses.replace(
 
 
 def trainings(name, folder):
-    return budget.Trainings(budget.METHODS[name], TINY_BUDGET, 0, folder)
+    return budget.Trainings(name, TINY_BUDGET, 0, folder)
 
 
 @pytest.mark.parametrize("budgets", [(), (15.0, 45.0), (20.0, 40.0), (7.5, 15.0)])
