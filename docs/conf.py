@@ -30,6 +30,7 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented_params"
 autodoc_inherit_docstrings = False
+autodoc_preserve_defaults = True
 python_display_short_literal_types = True
 add_module_names = False
 

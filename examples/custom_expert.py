@@ -12,7 +12,7 @@ import trainers
 from go1_mtl_gym import RobotState
 from go1_mtl_gym.actuation import PDGains
 from go1_mtl_gym.robot import HOME_POSE
-from trainers.utils.cli import main
+from trainers.utils.cli import main, positive_float
 
 NOD = np.tile([0.0, 0.12, -0.24], 4) * np.repeat([1.0, 1.0, -1.0, -1.0], 3)
 """Front legs bend while hind legs stretch [rad]; legs FL FR RL RR, joints hip thigh calf."""
@@ -41,7 +41,7 @@ class NoddingExpert:
 def run(arguments: Sequence[str] | None = None) -> None:
     """Let the expert drive, and keep what it saw and did as rows to learn from."""
     parser = argparse.ArgumentParser(description="Collect demonstrations of an expert of your own.")
-    parser.add_argument("--seconds", type=float, default=3.0, help="of robot time (default: 3)")
+    parser.add_argument("--seconds", type=positive_float, default=3.0, help="of robot time (default: 3)")
     options = parser.parse_args(arguments)
 
     rows = trainers.collect("trot", seconds=options.seconds, env_kwargs={"expert": NoddingExpert})

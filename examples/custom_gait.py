@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import gymnasium as gym
 
 from go1_mtl_gym import Gait, Task, register_task
-from trainers.utils.cli import main
+from trainers.utils.cli import main, positive_float
 
 AMBLE = Gait("amble", period=0.5, duty=0.65, offsets=(0.25, 0.75, 0.0, 0.5))
 """Cycle [s], fraction of it on the ground, and when each leg (FL FR RL RR) begins its cycle."""
@@ -19,7 +19,7 @@ AMBLE = Gait("amble", period=0.5, duty=0.65, offsets=(0.25, 0.75, 0.0, 0.5))
 def run(arguments: Sequence[str] | None = None) -> None:
     """Register the gait and let the expert walk it."""
     parser = argparse.ArgumentParser(description="Register a new gait and let the MPC expert walk it.")
-    parser.add_argument("--seconds", type=float, default=3.0, help="of robot time (default: 3)")
+    parser.add_argument("--seconds", type=positive_float, default=3.0, help="of robot time (default: 3)")
     options = parser.parse_args(arguments)
 
     register_task(Task("amble", AMBLE, command_range=(0.5, 0.2, 0.5)))  # vx, vy [m/s], yaw rate [rad/s]

@@ -1,7 +1,7 @@
 """The main job: expert demonstrations, cloning, DAgger, evaluation, pictures.
 
     python examples/dagger.py                      about 15 minutes on 2 cores, results under runs/<date>
-    python examples/dagger.py --preset smoke       two minutes, to see that everything works
+    python examples/dagger.py --preset smoke       a few minutes, to see that everything works
 
 Every stage leaves its result on disk; Ctrl-C keeps what is done and the same command with ``--out`` goes on from there.
 """
@@ -16,7 +16,7 @@ from typing import Any
 import trainers
 from go1_mtl_gym.rendering import RenderingError
 from trainers.pipeline.command_line import parse_job
-from trainers.utils.cli import main
+from trainers.utils.cli import interpreter, main
 
 SMOKE = """
 So little training gives a robot that falls: the smoke preset only shows that every stage works. Without --preset the
@@ -51,8 +51,8 @@ def summary(metrics: dict[str, Any], out: Path) -> str:
         trainers.results_table(metrics),
         "\nresults:",
         *there,
-        f"watch the training:  tensorboard --logdir {shlex.quote(str(out / 'tensorboard'))}",
-        f"run the policy:      python examples/quickstart.py {shlex.quote(str(out / 'policy.zip'))}",
+        f"watch the training:  {interpreter()} -m tensorboard.main --logdir {shlex.quote(str(out / 'tensorboard'))}",
+        f"run the policy:      {interpreter()} examples/quickstart.py {shlex.quote(str(out / 'policy.zip'))}",
     ]
     return "\n".join(lines)
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import gymnasium as gym
 
 import go1_mtl_gym
-from trainers.utils.cli import main
+from trainers.utils.cli import main, positive_float
 
 
 @main
@@ -18,7 +18,7 @@ def run(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description="Let the MPC expert drive through a change of gait and a push.")
     parser.add_argument("--task", choices=go1_mtl_gym.TASKS, default="trot", help="first gait (default: trot)")
     parser.add_argument("--then", choices=go1_mtl_gym.TASKS, default="walk", help="second gait (default: walk)")
-    parser.add_argument("--seconds", type=float, default=3.0, help="of each gait (default: 3)")
+    parser.add_argument("--seconds", type=positive_float, default=3.0, help="of each gait (default: 3)")
     options = parser.parse_args(arguments)
 
     env = gym.make(go1_mtl_gym.env_id(options.task))

@@ -9,8 +9,7 @@ import argparse
 from collections.abc import Sequence
 
 import trainers
-from go1_mtl_gym import TASKS
-from trainers.utils.cli import main
+from trainers.utils.cli import main, positive_float
 
 
 @main
@@ -18,9 +17,16 @@ def run(arguments: Sequence[str] | None = None) -> None:
     """Make the environment that the policy was trained for, and let it drive."""
     parser = argparse.ArgumentParser(description="Let a policy drive a Go1 and print what it does.")
     parser.add_argument("policy", nargs="?", help="file of a trained policy (default: the one in the package)")
-    parser.add_argument("--task", choices=TASKS, default="trot", help="gait (default: trot)")
-    parser.add_argument("--command", nargs=3, type=float, default=(0.5, 0.0, 0.0), metavar=("VX", "VY", "YAW"))
-    parser.add_argument("--seconds", type=float, default=5.0, help="of robot time (default: 5)")
+    parser.add_argument("--task", default="trot", help="a gait that the policy knows (default: trot)")
+    parser.add_argument(
+        "--command",
+        nargs=3,
+        type=float,
+        default=(0.5, 0.0, 0.0),
+        metavar=("VX", "VY", "YAW"),
+        help="velocity forward and to the left [m/s], yaw rate [rad/s] (default: 0.5 0 0)",
+    )
+    parser.add_argument("--seconds", type=positive_float, default=5.0, help="of robot time (default: 5)")
     parser.add_argument("--render", action="store_true", help="open a window")
     options = parser.parse_args(arguments)
 

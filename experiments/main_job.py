@@ -59,7 +59,7 @@ def summary_table(results: Results) -> str:
         rows.append([task, *cells, f"{TASKS[task].gait.step_rate:.2f}"])
     metrics = ("success", "velocity error [m/s]", "steps per second")
     header = [f"{metric}: {agent}" for metric in metrics for agent in ("expert", "student")]
-    return markdown(["gait", *header, "the gait's own"], rows)
+    return markdown(["gait", *header, "steps per second: planned"], rows)
 
 
 def tables(results: Results) -> list[str]:

@@ -12,6 +12,7 @@ from go1_mtl_gym.actuation import ActionMap, PDGains
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.gaits import Gait
 from go1_mtl_gym.sensing.observation import CHANNELS, FRAME_SIZE, UNITS, ObservationLayout
+from go1_mtl_gym.validation import integer_in, number_in
 
 CONTRACT_VERSION = 1
 """Raised whenever equal fields come to mean something else."""
@@ -33,6 +34,9 @@ class ObservationTerm:
     size: int
     unit: str = ""
 
+    def __post_init__(self) -> None:
+        integer_in(self.size, 1, 10**6, f"size of the observation's term {self.name!r}")
+
 
 @dataclass(frozen=True)
 class PolicyContract:
@@ -43,8 +47,8 @@ class PolicyContract:
 
     Attributes:
         tasks: names in the order of the one-hot task id, and of a policy's heads.
-        gaits: of the tasks, in the same order; the gait clock and the expert's answers follow from them. Empty where
-            they are not known.
+        gaits: of the tasks, in the same order; the gait clock and the expert's answers follow from them. None where one
+            is not known; empty stands for none of them.
         terms: the parts of the observation in their order, without the task id, which ends it.
         control_hz: observations and actions per second.
         kp, kd: gains of the actuators, tau = kp (target - q) - kd v [N m/rad], [N m s/rad].
@@ -54,11 +58,11 @@ class PolicyContract:
         version: `CONTRACT_VERSION` when it was made.
 
     Raises:
-        InvalidInputError: if sizes disagree.
+        InvalidInputError: if sizes disagree, or a field is not as described.
     """
 
     tasks: tuple[str, ...]
-    gaits: tuple[Gait, ...]
+    gaits: tuple[Gait | None, ...]
     terms: tuple[ObservationTerm, ...]
     control_hz: float
     kp: float
@@ -76,11 +80,33 @@ class PolicyContract:
             object.__setattr__(self, name, tuple(float(value) for value in getattr(self, name)))
         if not self.tasks or len(set(self.tasks)) != len(self.tasks):
             raise InvalidInputError(f"a contract needs tasks that differ from each other, got {self.tasks}")
-        if self.gaits and len(self.gaits) != len(self.tasks):
+        if not self.gaits:
+            object.__setattr__(self, "gaits", (None,) * len(self.tasks))
+        if len(self.gaits) != len(self.tasks):
             raise InvalidInputError(f"a contract of {len(self.tasks)} tasks needs as many gaits, got {len(self.gaits)}")
+        self._check_parts()
         sizes = {name: len(getattr(self, name)) for name in ("default_q", "action_scale", "joints")}
         if len(set(sizes.values())) != 1:
             raise InvalidInputError(f"joints, default_q and action_scale must be of equal length, got {sizes}")
+
+    def _check_parts(self) -> None:
+        """Refuse fields that mean nothing."""
+        terms = [term for term in self.terms if isinstance(term, ObservationTerm)]
+        names = [term.name for term in terms]
+        if len(terms) != len(self.terms) or len(set(names)) != len(names):
+            raise InvalidInputError(f"terms must be ObservationTerms of different names, got {self.terms}")
+        if not all(isinstance(name, str) for name in self.tasks) or not all(
+            isinstance(gait, (Gait, type(None))) for gait in self.gaits
+        ):
+            raise InvalidInputError(f"tasks must be names and gaits Gaits or None, got {self.tasks} and {self.gaits}")
+        number_in(self.control_hz, 1e-3, 1e6, "control_hz of a contract")
+        number_in(self.kp, 0.0, 1e6, "kp of a contract"), number_in(self.kd, 0.0, 1e6, "kd of a contract")
+        integer_in(self.version, 1, CONTRACT_VERSION, "version of a contract")
+        numbers = np.array([*self.default_q, *self.action_scale])
+        if not np.isfinite(numbers).all() or min(self.action_scale, default=1.0) <= 0:
+            raise InvalidInputError(
+                f"default_q must be finite and action_scale positive, got {self.default_q} and {self.action_scale}"
+            )
 
     @classmethod
     def of_environment(
@@ -167,11 +193,10 @@ class PolicyContract:
 
         Args:
             tasks: names in one-hot order.
-            gaits: of the tasks that are new here, by their names; without them no gait is known afterwards.
+            gaits: of the tasks that are new here, by their names.
         """
         known = dict(zip(self.tasks, self.gaits)) | dict(gaits or {})
-        complete = all(name in known for name in tasks)
-        return replace(self, tasks=tuple(tasks), gaits=tuple(known[name] for name in tasks) if complete else ())
+        return replace(self, tasks=tuple(tasks), gaits=tuple(known.get(name) for name in tasks))
 
     def with_terms(self, terms: Sequence[ObservationTerm]) -> "PolicyContract":
         """The same with other parts of the observation."""
@@ -187,8 +212,7 @@ class PolicyContract:
             ignore: names of fields that may differ.
         """
         pairs = {each.name: (getattr(self, each.name), getattr(other, each.name)) for each in fields(self)}
-        if not (self.gaits and other.gaits) or self.tasks != other.tasks:
-            pairs["gaits"] = _shared_gaits(self, other)
+        pairs["gaits"] = _shared_gaits(self, other)
         return {name: pair for name, pair in pairs.items() if name not in ignore and not _same(*pair)}
 
     def check(self, other: "PolicyContract", self_name: str, other_name: str, ignore: Sequence[str] = ()) -> None:
@@ -232,7 +256,7 @@ class PolicyContract:
                 )
             known = {each.name: values[each.name] for each in fields(cls)}
             known["terms"] = tuple(ObservationTerm(term["name"], term["size"], term["unit"]) for term in known["terms"])
-            known["gaits"] = tuple(Gait(**gait) for gait in known["gaits"])
+            known["gaits"] = tuple(None if gait is None else Gait(**gait) for gait in known["gaits"])
             return cls(**known)
         except (KeyError, TypeError, AttributeError) as error:
             raise InvalidInputError(f"not a policy contract: {type(error).__name__} {error}") from error
@@ -248,8 +272,8 @@ def terms_of(layout: ObservationLayout) -> tuple[ObservationTerm, ...]:
 
 
 def _shared_gaits(first: PolicyContract, second: PolicyContract) -> tuple[dict[str, Gait], dict[str, Gait]]:
-    """The gaits of tasks that both know, by the task's name."""
-    known = [dict(zip(each.tasks, each.gaits)) for each in (first, second)]
+    """The gaits that both know, by the task's name."""
+    known = [{name: gait for name, gait in zip(each.tasks, each.gaits) if gait} for each in (first, second)]
     both = [name for name in known[0] if name in known[1]]
     return {name: known[0][name] for name in both}, {name: known[1][name] for name in both}
 

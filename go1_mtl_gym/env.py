@@ -262,7 +262,8 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
             expert = make_expert(self.config.expert, self.gains, self.control_s)
             expert.reset(state)
             self._expert = expert
-        return self.action_map.from_radians(self._expert.action(state)).astype(np.float32)
+        target = finite_vector(self._expert.action(state), 12, "the expert's action [rad]")
+        return self.action_map.from_radians(target).astype(np.float32)
 
     def set_task(self, task: str, phase: float | None = None) -> None:
         """Change the task while running; the command goes on.

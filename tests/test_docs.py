@@ -146,6 +146,12 @@ def test_tables_are_whole(name):
     assert {line.count("|") for line in (rule, *rows)} == {header.count("|")}
 
 
+@pytest.mark.parametrize("name", TABLES)
+def test_tables_hold_no_tags_that_a_browser_would_swallow(name):
+    text = re.sub(r"`[^`]*`|\$[^$]*\$", "", TABLES[name]())
+    assert not re.findall(r"(?<!\\)<\w+>?", text)
+
+
 def test_pages_ask_for_tables_that_exist():
     asked = set(re.findall(r"```\{code-table\} (\w+)", "\n".join(PAGES.values())))
     assert asked == set(TABLES)

@@ -14,6 +14,7 @@ from types import ModuleType
 import pytest
 
 from go1_mtl_gym import PAPER_TASKS
+from trainers.utils.cli import interpreter
 
 ROOT = Path(__file__).parent.parent
 SMOKE_TASKS = ("bound", "walk")
@@ -81,13 +82,18 @@ def test_a_new_gait_leaves_a_policy_that_quickstart_drives(tmp_path, capsys):
     assert example("new_gait").run(options) == 0
     printed = capsys.readouterr().out
     assert "trot: success in 100 %" in printed and "pace: success in" in printed
+    assert printed.endswith(
+        "So little training is not enough to learn a gait; leave out --seconds and --steps to train in full.\n"
+    )
     assert example("quickstart").run([str(out), "--task", "pace", "--seconds", "0.2"]) == 0
 
 
 def test_a_policy_without_a_clock_is_made_and_saved(tmp_path, capsys):
     out = tmp_path / "phase_free.zip"
     assert example("phase_free").run(["--seconds", "1", "--steps", "10", "--episodes", "1", "--out", str(out)]) == 0
-    assert "without one it sees     command, last_action and 10 frames" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "without one it sees     command, last_action and 10 frames" in printed
+    assert "So little training is not enough to read the phase" in printed
     assert example("quickstart").run([str(out), "--seconds", "0.2"]) == 0
 
 
@@ -138,6 +144,54 @@ def test_a_policy_that_is_none_is_refused(tmp_path, capsys):
     (tmp_path / "policy.zip").write_text("no policy")
     assert "policy.zip" in refused("quickstart", [str(tmp_path / "policy.zip")], capsys)
     assert "nowhere.zip" in refused("quickstart", ["nowhere.zip"], capsys)
+
+
+def test_a_gait_that_the_policy_does_not_know_is_refused_with_those_that_it_knows(capsys):
+    message = refused("quickstart", ["--task", "pace"], capsys)
+    assert "'pace'" in message and all(f"'{task}'" in message for task in PAPER_TASKS)
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "-1", "0", "long"])
+@pytest.mark.parametrize("name", ["quickstart", "expert", "custom_gait", "custom_expert", "new_gait", "phase_free"])
+def test_an_impossible_duration_is_refused(name, value, capsys):
+    with pytest.raises(SystemExit) as end:
+        example(name).run([f"--seconds={value}"])
+    assert end.value.code == 2
+    assert f"argument --seconds: must be a finite number > 0, got '{value}'\n" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("option", ["--steps=0", "--steps=-1", "--episodes=0", "--episodes=1.5"])
+@pytest.mark.parametrize("name", ["new_gait", "phase_free", "ppo"])
+def test_an_impossible_count_is_refused_before_training(name, option, tmp_path, capsys):
+    option, _, value = option.partition("=")
+    with pytest.raises(SystemExit) as end:
+        example(name).run([f"{option}={value}", "--out", str(tmp_path / "runs" / "policy.zip")])
+    assert end.value.code == 2 and not list(tmp_path.iterdir())
+    assert f"argument {option}: must be a whole number > 0, got '{value}'\n" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["new_gait", "phase_free", "ppo"])
+def test_a_file_that_cannot_be_written_is_refused_before_training(name, tmp_path, capsys):
+    (tmp_path / "file").write_text("mine")
+    places = [
+        tmp_path,
+        tmp_path / "file" / "policy.zip",
+        *([Path("/proc/policy.zip")] if Path("/proc").is_dir() else []),
+    ]
+    for out in places:
+        assert str(out) in refused(name, ["--out", str(out)], capsys)
+    assert (tmp_path / "file").read_text() == "mine" and len(list(tmp_path.iterdir())) == 1
+
+
+def test_the_interpreter_to_type_is_the_one_that_runs_if_it_is_near(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys, "executable", str(tmp_path / "the venv" / "bin" / "python"))
+    monkeypatch.chdir(tmp_path)
+    assert interpreter() == "'the venv/bin/python'"
+    monkeypatch.chdir(tmp_path.parent)
+    assert interpreter().endswith("the venv/bin/python'")
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    assert interpreter() == "python"
 
 
 def test_a_command_beyond_the_limit_is_refused(capsys):
@@ -219,8 +273,8 @@ def test_smoke_prints_one_table_per_gait_and_leaves_its_files(smoke):
     assert output.count("| the same without a clock") == len(SMOKE_TASKS)
     for name in ("policy.zip", "phase_free.zip", "metrics.json"):
         assert f"  {out / name}" in output
-    assert f"tensorboard --logdir {out / 'tensorboard'}" in output
-    assert f"python examples/quickstart.py {out / 'policy.zip'}" in output
+    assert f"{interpreter()} -m tensorboard.main --logdir {out / 'tensorboard'}" in output
+    assert f"{interpreter()} examples/quickstart.py {out / 'policy.zip'}" in output
     assert "So little training gives a robot that falls" in output
     for name in ("policy.zip", "phase_free.zip", "joint_targets.png", "table.md", "config.json"):
         assert (out / name).stat().st_size > 0

@@ -196,7 +196,8 @@ def arguments() -> str:
 def job_options() -> str:
     """Options of the main job on the command line."""
     actions = [action for action in job_parser()._actions if action.dest != "help"]
-    return markdown(("option", "meaning"), [(f"`{action.option_strings[0]}`", action.help) for action in actions])
+    rows = [(f"`{action.option_strings[0]}`", (action.help or "").replace("<", r"\<")) for action in actions]
+    return markdown(("option", "meaning"), rows)
 
 
 def presets() -> str:

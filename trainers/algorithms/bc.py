@@ -272,7 +272,10 @@ def train_bc(
     Raises:
         InvalidInputError: if the rows do not belong to the policy's contract; nothing is changed then.
     """
+    config = config or BCConfig()
     dataset = dataset.fitted_to(policy.contract)
+    validation = None if validation is None else validation.fitted_to(policy.contract)
+    TensorBatches(dataset, min(config.batch_size, len(dataset)), config.seed)  # refuses a size that is too small
     if fit_normalization:
         policy.fit_normalization(dataset.obs, dataset.acts)
     return BCTrainer(policy, config, logger).fit(dataset, validation, progress, on_batch_end)

@@ -18,7 +18,8 @@ from trainers.algorithms.bc import BCConfig, BCHistory, BCTrainer
 from trainers.algorithms.dagger_collector import BlockCollector
 from trainers.data.collection import ShardMismatchError
 from trainers.data.demonstrations import Demonstrations
-from trainers.data.environments import contracts_of, derive_seed, flat_obs
+from trainers.data.environments import contracts_of, derive_seed, flat_obs, settings_of
+from trainers.policies.checkpoint import fingerprint
 from trainers.policies.expert_policy import ExpertPolicy
 from trainers.policies.multi_head import MultiHeadPolicy
 from trainers.policies.stateful import Learner
@@ -114,7 +115,7 @@ class DAggerTrainer(imitation_dagger.DAggerTrainer):
         self.base = base.fitted_to(policy.contract)
         if self.base.tasks != base.tasks:
             raise InvalidInputError(f"the policy has the tasks {policy.tasks}, environments and base have {base.tasks}")
-        self.validation = validation
+        self.validation = None if validation is None else validation.fitted_to(policy.contract)
         self.progress = progress
         logger = make_logger() if logger is None else logger
         super().__init__(
@@ -263,6 +264,9 @@ class DAggerTrainer(imitation_dagger.DAggerTrainer):
         """Share each task's rows among its environments, by the task ids of their first observations."""
         task = flat_obs(self.venv.reset())[:, -len(self.base.tasks) :].argmax(axis=1)
         count = np.bincount(task, minlength=len(self.base.tasks))
+        left_out = [name for k, name in enumerate(self.base.tasks) if not count[k] and name in self.base.per_task()]
+        if left_out:
+            raise InvalidInputError(f"no environment begins in {', '.join(left_out)}, of which the base has rows")
         return np.ceil(seconds_per_task * self.base.control_hz / count[task]).astype(int)
 
     def _claim_folder(self) -> None:
@@ -272,6 +276,8 @@ class DAggerTrainer(imitation_dagger.DAggerTrainer):
             "network": self.policy.network_kwargs() | {"contract": None},
             "contract": self.base.contract.as_dict(),
             "base": self.base.fingerprint(),
+            "policy": fingerprint(self.policy),
+            "environments": settings_of(self.venv),
         }
         settings = json_ready(settings)
         path = self.scratch_dir / "config.json"

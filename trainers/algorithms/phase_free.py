@@ -65,6 +65,7 @@ def train_phase(
     """
     config = config or PhaseConfig()
     seen, phase = inputs_and_phase(estimator, rows)
+    estimator.contract = rows.select(estimator.layout.channels, estimator.layout.history).contract
     device = estimator.normalizer.shift.device
     estimator.normalizer.set(*norm.fit(seen, "mean_std"))
     inputs, target = torch.as_tensor(seen, device=device), torch.as_tensor(phase, device=device)

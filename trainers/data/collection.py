@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import json
 from collections.abc import Callable, Iterable, Sequence
 from os import PathLike
 from pathlib import Path
@@ -13,7 +14,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 from tqdm.auto import tqdm
 
-from go1_mtl_gym.contract import terms_of
+from go1_mtl_gym.contract import PolicyContract, terms_of
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
 from go1_mtl_gym.sensing.observation import ObservationLayout
 from go1_mtl_gym.validation import finite_vector, integer_in
@@ -117,7 +118,8 @@ def collect(
         perturbation = dataclasses.replace(perturbation, command_interval=None)
     env = make_env(task, perturbation, **{"episode_s": EPISODE_S, **job.env_kwargs})
     try:
-        return _record(env, job, lambda obs: base_env(env).expert_action())
+        rows = _record(env, job, lambda obs: base_env(env).expert_action())
+        return dataclasses.replace(rows, meta=rows.meta | {"factory": _name_of(make_env)})
     finally:
         env.close()
 
@@ -231,7 +233,9 @@ def collect_all(
     paths = [Path(out_dir) / f"{job.name}.npz" for job in jobs]
     if len(set(paths)) < len(paths):
         raise InvalidInputError(f"jobs must differ in task, kind or seed, got {sorted(job.name for job in jobs)}")
-    todo = [(job, path) for job, path in zip(jobs, paths) if not _is_done(job, path)]
+    contracts = _contracts(jobs, make_env)
+    asked = zip(jobs, paths, (contracts[_setting(job)] for job in jobs))
+    todo = [(job, path) for job, path, contract in asked if not _is_done(job, path, contract, make_env)]
     done = len(jobs) - len(todo)
     with tqdm(total=len(jobs), initial=done, desc="collect", unit="shard", disable=not progress) as bar:
         if n_jobs == 1:
@@ -247,16 +251,41 @@ def collect_all(
     return paths
 
 
-def _is_done(job: CollectJob, path: Path) -> bool:
+def _setting(job: CollectJob) -> str:
+    """What jobs share that are made in equal environments."""
+    return json.dumps([job.task, json_form(job.env_kwargs, "env_kwargs")])
+
+
+def _contracts(jobs: Sequence[CollectJob], make_env: EnvFactory) -> dict[str, PolicyContract]:
+    """The contract of each setting; impossible ones are refused here, before anything is made."""
+    contracts = {}
+    for setting, job in {_setting(job): job for job in jobs}.items():
+        env = make_env(job.task, job.perturbation, **{"episode_s": EPISODE_S, **job.env_kwargs})
+        contracts[setting] = base_env(env).contract
+        env.close()
+    return contracts
+
+
+def _is_done(job: CollectJob, path: Path, contract: PolicyContract, make_env: EnvFactory) -> bool:
     try:
-        made_from = Demonstrations.load(path).meta.get("job")
+        shard = Demonstrations.load(path)
     except InvalidInputError:  # absent or damaged: make it again
         return False
-    if made_from != job.as_dict():
+    made_from = {name: shard.meta.get(name) for name in ("job", "factory")}
+    asked_for = {"job": job.as_dict(), "factory": _name_of(make_env)}
+    if made_from != asked_for:
         raise ShardMismatchError(
-            f"{path} was made from {made_from}, now asked for {job.as_dict()}; use another folder or delete it"
+            f"{path} was made from {made_from}, now asked for {asked_for}; use another folder or delete it"
         )
+    differences = contract.differences(shard.contract)
+    if differences:
+        raise ShardMismatchError(f"{path} was made under another contract: {differences}; use another folder")
     return True
+
+
+def _name_of(make_env: EnvFactory) -> str:
+    """Which factory, as far as a name tells."""
+    return f"{getattr(make_env, '__module__', '')}:{getattr(make_env, '__qualname__', type(make_env).__qualname__)}"
 
 
 def _make_shard(job: CollectJob, path: Path, make_env: EnvFactory) -> None:

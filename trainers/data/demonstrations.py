@@ -58,6 +58,9 @@ class Demonstrations:
         for name in ("obs", "acts"):
             if not np.isfinite(getattr(self, name)).all():
                 raise InvalidInputError(f"{name} must be finite, got NaN or infinity")
+        task_id = self.obs[:, -self.contract.n_tasks :]
+        if not (np.isin(task_id, (0.0, 1.0)).all() and (task_id.sum(1) == 1.0).all()):
+            raise InvalidInputError(f"every row must end in a one-hot id of the tasks {self.tasks}, not all do")
         if n and not self.starts[0]:
             raise InvalidInputError("the first row must start an episode: starts[0] is False")
 
@@ -100,6 +103,10 @@ class Demonstrations:
     def take(self, rows: np.ndarray) -> "Demonstrations":
         """A selection of rows, by increasing index or bool mask; an episode with rows cut out falls into several."""
         rows = np.asarray(rows)
+        if rows.ndim != 1 or rows.dtype.kind not in "iub" or (rows.dtype == bool and len(rows) != len(self)):
+            raise InvalidInputError(
+                f"rows must be indices or a mask of {len(self)} entries, got {rows.dtype} of shape {rows.shape}"
+            )
         rows = np.flatnonzero(rows) if rows.dtype == bool else rows
         starts = self.starts[rows] | (np.diff(rows, prepend=-2) != 1)
         return dataclasses.replace(self, obs=self.obs[rows], acts=self.acts[rows], starts=starts)

@@ -99,10 +99,22 @@ class PerturbationConfig:
 class ExpertAccess(gymnasium.Wrapper):
     """Carries `expert_action` and `contract` outward, so that a vector environment finds them on every gymnasium."""
 
+    def __init__(self, env: gymnasium.Env, perturbation: PerturbationConfig | None = None) -> None:
+        super().__init__(env)
+        self._perturbation = perturbation
+
     @property
     def contract(self) -> PolicyContract:
         """What gives observations and actions their meaning."""
         return base_env(self.env).contract
+
+    @property
+    def settings(self) -> str:
+        """Everything that the environment and its disturbances were made from, as text."""
+        config = getattr(self.env.unwrapped, "config", None)
+        if config is not None and not isinstance(config.expert, str):  # its repr would name a place in memory
+            config = dataclasses.replace(config, expert=f"callable:{type(config.expert).__qualname__}")
+        return f"{config!r} {self._perturbation!r}"
 
     def expert_action(self) -> np.ndarray:
         """The expert's action at the present state, shape (12,)."""
@@ -121,11 +133,11 @@ def make_env(task: str | None, perturbation: PerturbationConfig | None = None, *
         InvalidInputError: if the task is not registered, or an argument is not as described.
     """
     if task is not None:
-        one_of(task, tuple(go1_mtl_gym.TASKS), "task")
+        one_of(task, tuple(go1_mtl_gym.TASKS), "task (go1_mtl_gym.register_task adds others)")
     env = gymnasium.make(go1_mtl_gym.env_id(task), disable_env_checker=True, **env_kwargs)
     if perturbation is not None:
         env = go1_mtl_gym.PerturbationWrapper(env, **dataclasses.asdict(perturbation))
-    return ExpertAccess(env)
+    return ExpertAccess(env, perturbation)
 
 
 def make_venv(
@@ -185,6 +197,14 @@ def _in_processes(thunks: list[Callable[[], gymnasium.Env]]) -> "VecEnv":
 
 def contracts_of(venv: "VecEnv") -> tuple[PolicyContract, ...]:
     """The different contracts of the environments in a stable-baselines3 vector environment; none if they have none."""
+    from stable_baselines3.common.vec_env import VecNormalize, unwrap_vec_wrapper
+
+    normalizing = unwrap_vec_wrapper(venv, VecNormalize)
+    if normalizing is not None and normalizing.norm_obs:
+        raise InvalidInputError(
+            "environments whose observations mean what their contract says were expected, got VecNormalize, which "
+            "changes them: give it norm_obs=False (the policies normalize by themselves)"
+        )
     try:
         contracts = venv.get_attr("contract")
     except AttributeError:
@@ -198,6 +218,14 @@ def flat_obs(obs: Any) -> np.ndarray:
     stable-baselines3 annotates it for dictionaries and tuples too.
     """
     return cast(np.ndarray, obs)
+
+
+def settings_of(venv: "VecEnv") -> list[str]:
+    """What the environments of a vector environment were made from, one text each; none if they do not tell."""
+    try:
+        return [str(text) for text in venv.get_attr("settings")]
+    except AttributeError:
+        return []
 
 
 @dataclasses.dataclass(frozen=True)

@@ -7,10 +7,11 @@ import numpy as np
 
 from go1_mtl_gym import TASKS
 from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.validation import integer_in, one_of
 from trainers.data.environments import EnvFactory, base_env, derive_seed, make_env
-from trainers.evaluation.rollout import Rollout, check_agent, opened, run_all
+from trainers.evaluation.rollout import Rollout, checked_agent, opened, run_all
 from trainers.evaluation.scoring import ClosedLoopResult, EpisodeRecord, score
-from trainers.utils.validation import refuse_overridden
+from trainers.utils.validation import checked_jobs, positive, refuse_overridden
 
 
 def evaluate(
@@ -54,18 +55,19 @@ def evaluate(
     Raises:
         InvalidInputError: if an argument is not as described, or the policy is for another environment.
     """
-    if task not in TASKS:
-        raise InvalidInputError(f"task must be one of {', '.join(TASKS)}; got {task!r}")
-    if episodes < 1 or not seconds > 0:
-        raise InvalidInputError(f"episodes must be >= 1 and seconds > 0, got {episodes} and {seconds}")
+    one_of(task, tuple(TASKS), "task")
+    episodes, seed = integer_in(episodes, 1, 10**9, "episodes"), integer_in(seed, 0, 2**63 - 1, "seed")
+    seconds, n_jobs = positive(seconds, "seconds"), checked_jobs(n_jobs)
     if commands is not None and len(commands) == 0:
         raise InvalidInputError("commands must be None or hold at least one (vx, vy, yaw rate), got none")
     if commands is not None and corners:
         raise InvalidInputError(f"commands are given or drawn from corners, got corners=True and {commands}")
-    if command_interval is not None and not command_interval > 0:
-        raise InvalidInputError(f"command_interval must be None or positive, got {command_interval}")
+    if command_interval is not None:
+        command_interval = positive(command_interval, "command_interval")
+    if commands is not None:
+        commands = [TASKS[task].check_command(command).tolist() for command in commands]
     refuse_overridden(env_kwargs, episode_s="seconds", task="task")
-    check_agent(policy_or_expert)
+    policy_or_expert = checked_agent(policy_or_expert)
     kwargs = {**getattr(policy_or_expert, "env_kwargs", {}), **env_kwargs, "episode_s": seconds}
 
     def call(i: int) -> tuple[Any, ...]:

@@ -29,10 +29,12 @@ def joint_target_figure(
 
     Returns:
         A figure on an Agg canvas: ``figure.savefig(path)`` works without a display, and pyplot is not involved.
+
+    Raises:
+        InvalidInputError: if there are no rows, they do not belong to the policy's contract, or rows that are said to
+            be of one task are of another.
     """
-    per_task = demonstrations.per_task() if isinstance(demonstrations, Demonstrations) else dict(demonstrations)
-    if not per_task:
-        raise InvalidInputError("nothing to draw: there are no demonstrations")
+    per_task = _rows_per_task(policy, demonstrations)
     figure = Figure(figsize=(3.6 * len(JOINTS), 1.9 * len(per_task) + 0.4), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots(len(per_task), len(JOINTS), squeeze=False, sharex=True)
@@ -55,3 +57,21 @@ def joint_target_figure(
                 ax.set_xlabel("time [s]", fontsize=8)
     axes[0, 0].legend(fontsize=7, loc="upper right")
     return figure
+
+
+def _rows_per_task(
+    policy: "BasePolicy", demonstrations: Demonstrations | Mapping[str, Demonstrations]
+) -> dict[str, Demonstrations]:
+    """The rows of each task that has any, in the policy's order of tasks."""
+    contract = getattr(policy, "contract", None)
+    if isinstance(demonstrations, Demonstrations):
+        per_task = demonstrations.fitted_to(contract).per_task()
+    else:
+        per_task = {name: rows.fitted_to(contract) for name, rows in demonstrations.items() if len(rows)}
+    for name, rows in per_task.items():
+        tasks = list(rows.per_task())
+        if tasks != [name]:
+            raise InvalidInputError(f"rows of the task {name!r} were expected under that name, got rows of {tasks}")
+    if not per_task:
+        raise InvalidInputError("nothing to draw: there are no demonstrations")
+    return per_task

@@ -5,12 +5,11 @@ from typing import Any
 import numpy as np
 
 from go1_mtl_gym import TASKS
-from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.validation import one_of
+from go1_mtl_gym.validation import integer_in, number_in, one_of
 from trainers.data.environments import EnvFactory, base_env, derive_seed, make_env
-from trainers.evaluation.rollout import Rollout, check_agent, opened, run_all
+from trainers.evaluation.rollout import Rollout, checked_agent, opened, run_all
 from trainers.evaluation.scoring import ClosedLoopResult, EpisodeRecord, score
-from trainers.utils.validation import refuse_overridden
+from trainers.utils.validation import checked_jobs, positive, refuse_overridden
 
 
 def evaluate_transition(
@@ -55,15 +54,14 @@ def evaluate_transition(
     Raises:
         InvalidInputError: if an argument is not as described.
     """
+    policy_or_expert = checked_agent(policy_or_expert)
     refuse_overridden(env_kwargs, episode_s="before_s and after_s", task="first")
     kwargs = {"tasks": tuple(TASKS), **getattr(policy_or_expert, "env_kwargs", {}), **env_kwargs}
     for task in (first, second):
         one_of(task, tuple(kwargs["tasks"]), "task")
-    if trials < 1 or not (before_s >= 0 and after_s > 0):
-        raise InvalidInputError(
-            f"trials must be >= 1, before_s >= 0 and after_s > 0, got {trials}, {before_s} and {after_s}"
-        )
-    check_agent(policy_or_expert)
+    trials, seed = integer_in(trials, 1, 10**9, "trials"), integer_in(seed, 0, 2**63 - 1, "seed")
+    before_s, after_s = number_in(before_s, 0.0, 1e6, "before_s"), positive(after_s, "after_s")
+    n_jobs = checked_jobs(n_jobs)
     kwargs["episode_s"] = before_s + TASKS[first].gait.period + after_s + 1.0
 
     def call(i: int) -> tuple[Any, ...]:

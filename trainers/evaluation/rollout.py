@@ -12,14 +12,15 @@ from tqdm.auto import tqdm
 
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.expert import check_expert_fits
+from go1_mtl_gym.validation import finite_vector
 from trainers.data.environments import EnvFactory, Go1Like, WithTasks, base_env
 from trainers.evaluation.scoring import Series
 from trainers.policies.stateful import Learner
 from trainers.utils.processes import keep_interrupts
 
 
-def check_agent(policy_or_expert: Any) -> None:
-    """Refuse what can neither be followed nor asked.
+def checked_agent(policy_or_expert: Any) -> Any:
+    """Return what can be followed or asked: of a stable-baselines3 model with our policy, the policy.
 
     Args:
         policy_or_expert: as in `trainers.evaluate`.
@@ -27,11 +28,15 @@ def check_agent(policy_or_expert: Any) -> None:
     Raises:
         InvalidInputError: if it is neither a policy nor an expert.
     """
+    inner = getattr(policy_or_expert, "policy", None)
+    if hasattr(inner, "contract") and not hasattr(policy_or_expert, "contract"):
+        return inner
     named = isinstance(policy_or_expert, str) and policy_or_expert == "expert"
     if not (named or hasattr(policy_or_expert, "predict") or hasattr(policy_or_expert, "action")):
         raise InvalidInputError(
             f'expected something with predict(obs), something with action(state), or "expert"; got {policy_or_expert!r}'
         )
+    return policy_or_expert
 
 
 def controller(policy_or_expert: Any, env: Go1Like) -> Callable[[np.ndarray], np.ndarray]:
@@ -44,14 +49,19 @@ def controller(policy_or_expert: Any, env: Go1Like) -> Callable[[np.ndarray], np
     Raises:
         InvalidInputError: if it is neither a policy nor an expert, or was made for another environment.
     """
-    check_agent(policy_or_expert)
+    policy_or_expert = checked_agent(policy_or_expert)
     if isinstance(policy_or_expert, str):
         return lambda obs: env.expert_action()
     if hasattr(policy_or_expert, "predict"):
         _check_contract(policy_or_expert, env)
         return _follow(Learner(policy_or_expert))
     _check_expert(policy_or_expert, env)
-    return lambda obs: env.action_map.from_radians(policy_or_expert.action(_expert_state(env))).astype(np.float32)
+
+    def ask(obs: np.ndarray) -> np.ndarray:
+        target = finite_vector(policy_or_expert.action(_expert_state(env)), 12, "the expert's action [rad]")
+        return env.action_map.from_radians(target).astype(np.float32)
+
+    return ask
 
 
 def _check_contract(policy: Any, env: Any) -> None:

@@ -120,6 +120,15 @@ class ClosedLoopResult:
         """95 % Wilson interval of the success rate."""
         return wilson_interval(sum(e.success for e in self.episodes), len(self.episodes))
 
+    def __str__(self) -> str:
+        """One line for people; `repr` has every episode."""
+        count, low, high = len(self.episodes), *self.success_interval
+        return (
+            f"{self.task}: {sum(e.success for e in self.episodes)} of {count} episodes of {self.seconds:g} s succeed "
+            f"(95 % interval {low:.0%} ... {high:.0%}), {sum(not e.fallen for e in self.episodes)} survive, "
+            f"velocity error {self.velocity_error:.3f} m/s, {self.step_rate:.2f} steps/s"
+        )
+
     def as_dict(self) -> dict[str, Any]:
         """JSON-ready values; NaN becomes None."""
         names = ("survival_rate", "survival_s", "velocity_error", "yaw_rate_error", "step_rate", "success_rate")

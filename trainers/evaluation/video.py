@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 from go1_mtl_gym import Go1Env
 from go1_mtl_gym.errors import InvalidInputError
 from trainers.data.environments import base_env, make_env
-from trainers.evaluation.rollout import begin, controller
+from trainers.evaluation.rollout import begin, checked_agent, controller
 from trainers.utils.files import write_atomically
 from trainers.utils.validation import refuse_overridden
 
@@ -65,6 +65,7 @@ def record_frames(
         raise InvalidInputError(f"seconds must be > 0 and fps from 1 to {MAX_FPS}, got {seconds} and {fps}")
     if min(width, height) < 16 or max(width, height) > 2048:
         raise InvalidInputError(f"width and height must be from 16 to 2048 pixels, got {width} and {height}")
+    policy_or_expert = checked_agent(policy_or_expert)
     refuse_overridden(env_kwargs, episode_s="seconds", render_mode="record_frames", task="task")
     kwargs = {**getattr(policy_or_expert, "env_kwargs", {}), **env_kwargs, "episode_s": seconds + 1.0}
     kwargs |= {"render_mode": "rgb_array", "width": 2 * width, "height": 2 * height}

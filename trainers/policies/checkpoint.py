@@ -1,5 +1,6 @@
 """Policies on disk: one zip of ``policy.json`` and safetensors files; reading it executes no code."""
 
+import hashlib
 import json
 import math
 import zipfile
@@ -214,6 +215,11 @@ def _read_zip(path: Path) -> tuple[Any, dict[str, dict[str, torch.Tensor]]]:
 def tensors_of(module: torch.nn.Module) -> dict[str, torch.Tensor]:
     """The weights and buffers of a module, as safetensors wants them."""
     return {name: value.detach().cpu().contiguous() for name, value in module.state_dict().items()}
+
+
+def fingerprint(module: torch.nn.Module) -> str:
+    """A digest of the weights and buffers of a module."""
+    return hashlib.sha256(safetensors.torch.save(tensors_of(module))).hexdigest()
 
 
 def versions() -> dict[str, str]:

@@ -6,11 +6,13 @@ from typing import Any
 
 import gymnasium
 
+from go1_mtl_gym import TASKS
 from go1_mtl_gym.contract import PolicyContract
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import one_of
 from trainers.data.environments import base_env, make_env
 from trainers.utils.files import json_form
+from trainers.utils.validation import refuse_overridden
 
 
 class ForEnvironment:
@@ -61,18 +63,36 @@ class ForEnvironment:
         """
         if task is not None:
             one_of(task, self.tasks, "task")
+        refuse_overridden(env_kwargs, perturbation="trainers.make_env")
+        self._check_registered()
         env = make_env(task, None, **{**self.env_kwargs, **env_kwargs})
         if self.contract is not None:
             self.contract.check(base_env(env).contract, "the policy", "the environment")
         return env
 
+    def _check_registered(self) -> None:
+        """Say how to make known what another process knew."""
+        known = {} if self.contract is None else dict(zip(self.contract.tasks, self.contract.gaits))
+        unknown = [(name, gait) for name, gait in known.items() if name not in TASKS]
+        if unknown:
+            raise InvalidInputError(
+                f"the policy's task {unknown[0][0]!r} is not registered in this process: "
+                f"go1_mtl_gym.register_task(Task({unknown[0][0]!r}, {unknown[0][1]}, command_range=...)) first"
+            )
 
-def json_arguments(env_kwargs: Mapping[str, Any]) -> dict[str, Any]:
-    """An environment's arguments as JSON values that the environment takes too.
+
+def json_arguments(env_kwargs: Mapping[str, Any], contract: PolicyContract | None) -> dict[str, Any]:
+    """An environment's arguments as JSON values that the environment takes too, without what a contract says already.
 
     Raises:
-        InvalidInputError: if one of them has no such form, so that a policy with it could not be saved.
+        InvalidInputError: if one of them has no such form, so that a policy with it could not be saved, or says
+            something else than the contract.
     """
+    said = contract.env_kwargs if contract else {}
+    for name, value in said.items():
+        if name in env_kwargs and json_form(env_kwargs[name], name) != json_form(value, name):
+            raise InvalidInputError(f"by the contract {name} is {value}, env_kwargs say {env_kwargs[name]}")
+    env_kwargs = {name: value for name, value in env_kwargs.items() if name not in said}
     partial = [name for name, value in env_kwargs.items() if isinstance(value, functools.partial)]
     if partial:
         raise InvalidInputError(

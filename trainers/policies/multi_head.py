@@ -108,7 +108,7 @@ class MultiHeadPolicy(SavedPolicy, ForEnvironment, ActorCriticPolicy):
         self.pooled = bool(pooled)
         self.normalization = normalization
         self.clip_sd = float(clip_sd)
-        self.extra_env_kwargs = json_arguments(env_kwargs or {})
+        self.extra_env_kwargs = json_arguments(env_kwargs or {}, contract)
         self.seed = seed
         self.critic_lr_factor = float(critic_lr_factor)
         super().__init__(
@@ -317,7 +317,8 @@ class MultiHeadPolicy(SavedPolicy, ForEnvironment, ActorCriticPolicy):
             InvalidInputError: if an observation has another size or is not finite, or does not end in a one-hot task
                 id.
         """
-        if isinstance(observation, np.ndarray):
+        if not isinstance(observation, dict):
+            observation = _as_array(observation)
             check_observation(observation, self.contract, self.observation_space.shape[0], self.n_tasks, self.pooled)
         return super().predict(observation, state, episode_start, deterministic)
 
@@ -353,3 +354,16 @@ class MultiHeadPolicy(SavedPolicy, ForEnvironment, ActorCriticPolicy):
         policy.seed = None
         policy.load_state_dict(checkpoint.weights["weights"])
         return policy
+
+
+def _as_array(observation: Any) -> np.ndarray:
+    """Numbers of whatever kind as an array.
+
+    Raises:
+        InvalidInputError: if there are no numbers in it.
+    """
+    try:
+        plain = observation.detach().cpu() if isinstance(observation, torch.Tensor) else observation
+        return np.asarray(plain, dtype=np.float32)
+    except (TypeError, ValueError) as error:
+        raise InvalidInputError(f"observations must be arrays of numbers, got {observation!r}") from error

@@ -6,6 +6,7 @@ import numpy as np
 import torch
 from torch import nn
 
+from go1_mtl_gym.contract import PolicyContract
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.sensing.observation import ObservationLayout
 from trainers.data.demonstrations import Demonstrations
@@ -26,6 +27,9 @@ class PhaseEstimator(nn.Module):
         width: units of each hidden layer.
         seed: of the initial weights, without touching torch's global generator.
 
+    Attributes:
+        contract: of what it sees, once it was trained or given to a policy: it knows the rate and the gaits.
+
     Raises:
         InvalidInputError: if the layout holds the phase, or the width is no positive integer.
     """
@@ -37,6 +41,7 @@ class PhaseEstimator(nn.Module):
         if not isinstance(width, (int, np.integer)) or width < 1:
             raise InvalidInputError(f"width must be a positive integer, got {width!r}")
         self.layout = layout
+        self.contract: PolicyContract | None = None
         self.width = int(width)
         self.normalizer = norm.Normalizer(layout.size)
         with seeded(seed):
@@ -84,7 +89,10 @@ def inputs_and_phase(estimator: PhaseEstimator, rows: Demonstrations) -> tuple[n
         raise InvalidInputError(f"expected rows with the phase, got {len(rows)} with the channels {contract.channels}")
     if layout.tasks != contract.tasks:
         raise InvalidInputError(f"the estimator knows the tasks {layout.tasks}, the rows have {contract.tasks}")
-    return rows.select(layout.channels, layout.history).obs, rows.obs[:, contract.slices["phase"]]
+    seen = rows.select(layout.channels, layout.history)
+    if estimator.contract is not None:
+        estimator.contract.check(seen.contract, "the phase estimator", "the demonstrations")
+    return seen.obs, rows.obs[:, contract.slices["phase"]]
 
 
 def phase_distance(first: np.ndarray, second: np.ndarray) -> np.ndarray:

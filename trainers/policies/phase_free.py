@@ -63,9 +63,12 @@ class PhaseFreePolicy(SavedPolicy, ForEnvironment, BasePolicy):
         self.n_tasks = layout.n_tasks
         contract = student.named_contract().with_terms(terms_of(layout))
         self.contract = contract
+        if estimator.contract is not None:
+            self.contract.check(estimator.contract, "the student", "the phase estimator")
+        estimator.contract = self.contract
         self.extra_env_kwargs = student.extra_env_kwargs
-        gaits = contract.gaits
-        if not gaits:
+        gaits = [gait for gait in contract.gaits if gait is not None]
+        if len(gaits) < layout.n_tasks:
             raise InvalidInputError("a student whose contract names the gaits of its tasks was expected")
         self._turn = np.array([1.0 / (gait.period * contract.control_hz) for gait in gaits])
         self._can_stand = np.array([gait.can_stand for gait in gaits])

@@ -1,10 +1,15 @@
 """Programs for the command line: an error is one sentence on stderr and an exit status, never a traceback."""
 
+import argparse
 import functools
+import shlex
 import sys
+import tempfile
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
-from go1_mtl_gym.errors import Go1Error
+from go1_mtl_gym.errors import Go1Error, InvalidInputError
+from trainers.utils.validation import positive
 
 BAD_INPUT = 2
 """Exit status after an error that the user can mend, as `argparse` has it."""
@@ -50,6 +55,59 @@ def main(program: Program) -> Callable[..., int]:
         return 0
 
     return run
+
+
+def positive_float(text: str) -> float:
+    """A finite number above zero, as the `type` of an argument of `argparse`.
+
+    Raises:
+        argparse.ArgumentTypeError: if the text is something else.
+    """
+    try:
+        return positive(float(text), "it")
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be a finite number > 0, got {text!r}") from None
+
+
+def positive_int(text: str) -> int:
+    """A whole number above zero, as the `type` of an argument of `argparse`.
+
+    Raises:
+        argparse.ArgumentTypeError: if the text is something else.
+    """
+    try:
+        positive(number := int(text), "it")
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be a whole number > 0, got {text!r}") from None
+    return number
+
+
+def writable_file(path: str | Path) -> Path:
+    """Return the path of a file after a proof that it can be written; its folder is made.
+
+    Ask before long work, whose result would be lost otherwise.
+
+    Raises:
+        InvalidInputError: if it is a folder, or no file can be made beside it.
+    """
+    file = Path(path)
+    if file.is_dir():
+        raise InvalidInputError(f"the path of a file was expected, got the folder {str(path)!r}")
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=file.parent):
+            pass
+    except OSError as error:
+        raise InvalidInputError(f"{str(path)!r} cannot be written: {error.strerror}") from error
+    return file
+
+
+def interpreter() -> str:
+    """What to type for the Python that runs: its path from the working directory if it lies below, else "python"."""
+    try:
+        return shlex.quote(Path(sys.executable).relative_to(Path.cwd()).as_posix())
+    except ValueError:
+        return "python"
 
 
 def _sentence(error: Exception) -> str:

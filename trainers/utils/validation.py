@@ -21,6 +21,17 @@ def positive(value: object, name: str) -> float:
     return float(value)
 
 
+def checked_jobs(n_jobs: object) -> int:
+    """Return a number of processes as joblib has it: positive, or negative for all cores but some.
+
+    Raises:
+        InvalidInputError: if it is no whole number, or 0.
+    """
+    if isinstance(n_jobs, (bool, np.bool_)) or not isinstance(n_jobs, (int, np.integer)) or n_jobs == 0:
+        raise InvalidInputError(f"n_jobs must be a whole number other than 0, got {n_jobs!r}")
+    return int(n_jobs)
+
+
 def refuse_overridden(env_kwargs: Mapping[str, Any], **instead: str) -> None:
     """Refuse arguments of an environment that a function sets itself.
 
