@@ -3,7 +3,7 @@
 import dataclasses
 from abc import abstractmethod
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from typing import Any, ClassVar
 
@@ -130,21 +130,13 @@ class Lab:
         """Stand up with a task and a command (vx, vy [m/s], yaw rate [rad/s]), seeded by `keys`."""
         self.env.reset(seed=derive_seed("lab", task, *keys), options={"task": task, "command": tuple(command)})
 
-    def drive(self, seconds: float) -> Iterator[dict[str, Any]]:
-        """Let the expert walk for some seconds or until a fall; yields the info of every step."""
-        for _ in range(round(seconds * self.env.control_hz)):
-            info = self.step()
-            yield info
-            if info["fallen"]:
-                return
-
     def step(self) -> dict[str, Any]:
         """One control period under the expert; its info."""
         return self.env.step(self.env.expert_action())[4]
 
     def walk(self, seconds: float) -> bool:
-        """`drive`, and whether it stayed up."""
-        return not any(info["fallen"] for info in self.drive(seconds))
+        """Let the expert walk for some seconds or until a fall; returns whether it stayed up."""
+        return not any(self.step()["fallen"] for _ in range(round(seconds * self.env.control_hz)))
 
     def score(
         self, task: str, seconds: float, seed: int, episodes: int = 1, command: Any = None, **options: Any

@@ -99,7 +99,8 @@ def _states(lab: Lab, task: str, options: LabelOptions, seed: int) -> list[Robot
 def _displaced(state: RobotState, rng: np.random.Generator, distance: float) -> RobotState:
     """The same robot somewhere else, facing another way."""
     yaw = rng.uniform(-np.pi, np.pi)
-    turn = yaw_matrix(yaw)
+    turn = np.eye(3)
+    turn[:2, :2] = yaw_matrix(yaw)
     w, x, y, z = state.quat_wxyz
     quat = np.cos(yaw / 2) * state.quat_wxyz + np.sin(yaw / 2) * np.array([-z, -y, x, w])
     return replace(

@@ -145,11 +145,13 @@ class Ablation(Study):
             "changed": "changed world",
             "r2": "one-step R2",
         }
-        aggregates = {name: aggregate_variant(variant) for name, variant in group(results.records, "agent").items()}
-        variants = {
-            label: {name: variant[key] for name, variant in aggregates.items()} for key, label in columns.items()
-        }
-        return plots.dots({label: {"variants": values} for label, values in variants.items()})
+        variants = {name: aggregate_variant(records) for name, records in group(results.records, "agent").items()}
+        return plots.dots(
+            {
+                label: {"variants": {name: metrics[key] for name, metrics in variants.items()}}
+                for key, label in columns.items()
+            }
+        )
 
 
 def aggregate_variant(records: Group) -> dict[str, Any]:

@@ -186,15 +186,11 @@ class PhaseFree(Study):
         return table(group(results.records, "agent"), [""], columns)
 
     def figure(self, results: Results) -> Figure:
-        agents = group(results.of(task=ALL_GAITS), ["condition", "agent"])
-        success = {
-            condition: {agent: members.rate() for (name, agent), members in agents.items() if name == condition}
-            for condition in (WALKING, NOISY, TRANSITIONS)
-        }
-        errors = {
-            key: {agent: members.mean(key) for (name, agent), members in agents.items() if name == PHASE_ERROR}
-            for key in ("median", "p99")
-        }
+        together = results.of(task=ALL_GAITS)
+        walked = (record for record in together if record["condition"] != PHASE_ERROR)
+        success = plots.panel(walked, "condition", "agent", Group.rate)
+        per_agent = group(together.where(condition=PHASE_ERROR), "agent").items()
+        errors = {key: {agent: members.mean(key) for agent, members in per_agent} for key in ("median", "p99")}
         return plots.dots({"success": success, "phase error [cycles]": errors}, log=["phase error [cycles]"])
 
 
