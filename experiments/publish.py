@@ -6,11 +6,10 @@ Nothing in them is typed by hand; ``--check`` fails when what is committed is ou
 import argparse
 import shutil
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 
 from experiments import main_job
-from experiments.catalog import STUDIES, study_class
+from experiments.catalog import STUDIES, resolve, study_class
 from experiments.plots import save_figure
 from experiments.results import Results, read_json, without_folders
 from experiments.tables import markdown
@@ -43,11 +42,6 @@ class Page:
     studies: str
     about: str
     lead: str = ""
-
-    def leading(self, measured: dict[str, Results]) -> list[str]:
-        """The paragraphs above the studies."""
-        module, _, function = self.lead.partition(":")
-        return getattr(import_module(module), function)(measured) if module else []
 
 
 PAGES = {
@@ -84,7 +78,7 @@ def page(name: str, folder: Path) -> str | None:
             sections += section(study, measured[study], folder)
     if not measured:
         return None
-    lead = [f"# {about.title}", GENERATED, about.about, *about.leading(measured)]
+    lead = [f"# {about.title}", GENERATED, about.about, *(resolve(about.lead)(measured) if about.lead else [])]
     return "\n\n".join([*lead, *sections, *how_it_was_made([*measured.values()])]) + "\n"
 
 
