@@ -109,12 +109,12 @@ def policy_files(words: Sequence[str]) -> tuple[PolicyFile, ...]:
 
 
 def with_expert(policies: Sequence[Agent]) -> list[Agent]:
-    """The policies and, last, the expert in an environment of the same tasks, control rate and gains.
+    """The policies (none: the shipped one) and, last, the expert in an environment of equal tasks, rate and gains.
 
     Raises:
         InvalidInputError: if the policies' environments differ in these.
     """
-    shared = []
+    shared, policies = [], policies or [shipped(STUDENT, "clocked")]
     for agent in policies:
         kwargs = {"tasks": tuple(TASKS)} | agent.load().env_kwargs
         shared.append({key: kwargs[key] for key in SHARED if key in kwargs})

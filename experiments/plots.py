@@ -12,8 +12,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 
-from experiments.results import Record
-from experiments.stats import Group, Rate, group
+from experiments.results import Group, Record, group
+from experiments.stats import Rate
 
 BLUE, RED, GREEN, PURPLE, YELLOW = "#2166ac", "#d6604d", "#1b9e77", "#7570b3", "#e6ab02"
 STUDENTS = (BLUE, GREEN, PURPLE, YELLOW)

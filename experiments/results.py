@@ -9,9 +9,54 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from experiments.stats import Group, Record
+import numpy as np
+
+from experiments.stats import Rate
 from go1_mtl_gym.errors import InvalidInputError
 from trainers.utils.files import json_ready, write_atomically
+
+Record = dict[str, Any]
+"""{"study", "agent", "task", "condition", "seed", metrics ...}."""
+
+
+class Group(tuple[Record, ...]):
+    """Some records, taken together."""
+
+    def where(self, **values: Any) -> "Group":
+        """The records that have these values."""
+        return Group(record for record in self if all(record.get(name) == value for name, value in values.items()))
+
+    def total(self, key: str) -> int:
+        """Sum over the records that have it."""
+        return sum(self.values(key))
+
+    def rate(self, key: str = "succeeded") -> Rate:
+        """A count of the "trials" of those records that have both."""
+        known = [record for record in self if record.get(key) is not None]
+        return Rate(sum(record[key] for record in known), sum(record["trials"] for record in known))
+
+    def values(self, key: str) -> list[float]:
+        """The values that are there."""
+        return [record[key] for record in self if record.get(key) is not None]
+
+    def mean(self, key: str) -> float | None:
+        """Mean of the values that are there; None if there are none."""
+        known = self.values(key)
+        return float(np.mean(known)) if known else None
+
+    def largest(self, key: str) -> float | None:
+        """The largest value; None if there is no record, or one without: that would have been the worst."""
+        known = self.values(key)
+        return max(known) if self and len(known) == len(self) else None
+
+
+def group(records: Iterable[Record], by: str | Sequence[str]) -> dict[Any, Group]:
+    """The records by the values of one key, or by the tuples of values of several; keys that are missing are None."""
+    groups: dict[Any, list[Record]] = {}
+    for record in records:
+        key = record.get(by) if isinstance(by, str) else tuple(record.get(name) for name in by)
+        groups.setdefault(key, []).append(record)
+    return {key: Group(members) for key, members in groups.items()}
 
 
 @dataclass(frozen=True)

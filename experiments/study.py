@@ -13,8 +13,7 @@ from typing import Any, ClassVar
 from matplotlib.figure import Figure
 
 from experiments.agents import Agent
-from experiments.results import Record, Results, distinct
-from experiments.stats import group
+from experiments.results import Record, Results, distinct, group
 from experiments.tables import Column, table
 from go1_mtl_gym.errors import InvalidInputError
 from trainers.policies.checkpoint import versions

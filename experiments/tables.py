@@ -4,7 +4,8 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from experiments.stats import Estimate, Group, Rate
+from experiments.results import Group
+from experiments.stats import Estimate, Rate
 from go1_mtl_gym.validation import one_of
 from trainers.utils.report import markdown, number
 

@@ -12,8 +12,7 @@ from experiments.agents import Agent
 from experiments.benchmarks.peers import Go2ConvexMPC
 from experiments.expert.timing import elapsed, quantiles
 from experiments.pushing import CRUISE
-from experiments.results import Results
-from experiments.stats import group
+from experiments.results import Results, group
 from experiments.study import Cell, Metrics, Study, option
 from experiments.tables import mean, table
 from experts import MPCConfig, NMPCConfig, NMPCExpert

@@ -6,8 +6,7 @@ from typing import Any
 from experiments.expert.commands import ONE
 from experiments.expert.timing import REAL_TIME, UPDATE
 from experiments.pushing import PAIRS, weaker
-from experiments.results import Record, Results, distinct
-from experiments.stats import Group
+from experiments.results import Group, Record, Results, distinct
 from experiments.tables import count, markdown, number
 
 NOTE = (

@@ -9,9 +9,8 @@ from matplotlib.figure import Figure
 from experiments import plots
 from experiments.expert.lab import ExpertOptions, ExpertStudy, Lab, generator
 from experiments.pushing import CRUISE, DIRECTIONS, push_w
-from experiments.results import Results
+from experiments.results import Results, group
 from experiments.searches import climb, scouted
-from experiments.stats import group
 from experiments.study import option
 from experiments.tables import mean
 from go1_mtl_gym import TASKS

@@ -13,8 +13,7 @@ from experiments.agents import Agent
 from experiments.expert.lab import ExpertOptions, ExpertStudy, Lab
 from experiments.expert.limits import PushOptions, largest_push
 from experiments.pushing import CRUISE
-from experiments.results import Results
-from experiments.stats import group
+from experiments.results import Results, group
 from experiments.study import option
 from experiments.tables import markdown, mean, share
 from experts import NMPCConfig, NMPCExpert

@@ -20,8 +20,7 @@ from experiments.new_gaits.learning import (
     held_out,
     rehearsal,
 )
-from experiments.results import Results
-from experiments.stats import Group, group
+from experiments.results import Group, Results, group
 from experiments.student.episodes import counts, evaluate_gaits
 from experiments.study import ALL_GAITS, Cell, Metrics, Study
 from experiments.tables import count, markdown, number, percent

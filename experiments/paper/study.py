@@ -15,8 +15,8 @@ from experiments.paper.differences import differences
 from experiments.paper.networks import Network, account, held_out
 from experiments.paper.published import KINDS, METRICS, MULTI_HEAD, PER_GAIT, POOLED, PUBLISHED, TARGETS
 from experiments.paper.settings import NAMED, TRAIN, UNSEEN, PaperOptions, Table, shard_jobs
-from experiments.results import Record, Results
-from experiments.stats import Group, estimate, group
+from experiments.results import Group, Record, Results, group
+from experiments.stats import estimate
 from experiments.study import ALL_GAITS, Cell, Metrics, Study
 from experiments.tables import estimated, markdown, number
 from experiments.training_runs import collect

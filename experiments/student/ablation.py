@@ -7,8 +7,7 @@ from matplotlib.figure import Figure
 
 from experiments import plots
 from experiments.agents import Agent
-from experiments.results import Results, distinct
-from experiments.stats import Group, group
+from experiments.results import Group, Results, distinct, group
 from experiments.student.commanded import DRAWN
 from experiments.student.episodes import drawn, other_gaits
 from experiments.student.transitions import TransitionOptions, transition

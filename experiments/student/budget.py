@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 import trainers
 from experiments import plots
 from experiments.agents import Agent
-from experiments.results import Results
-from experiments.stats import Group, drops, group
+from experiments.results import Group, Results, group
+from experiments.stats import drops
 from experiments.student.episodes import counts, evaluate_gaits
 from experiments.study import ALL_GAITS, Cell, Metrics, Study, option
 from experiments.tables import markdown, number, percent

@@ -7,8 +7,8 @@ from matplotlib.figure import Figure
 
 from experiments import plots
 from experiments.agents import EXPERT, PHASE_FREE, SHARED, STUDENT, Agent
-from experiments.results import Results
-from experiments.stats import Group, Rate, group
+from experiments.results import Group, Results, group
+from experiments.stats import Rate
 from experiments.student.episodes import drawn
 from experiments.student.phase import with_correction
 from experiments.study import EVALUATION_CODE, Cell, Metrics, Study, option

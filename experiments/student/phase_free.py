@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 import trainers
 from experiments import plots
 from experiments.agents import Agent, shipped
-from experiments.results import Results, distinct
-from experiments.stats import Group, group
+from experiments.results import Group, Results, distinct, group
 from experiments.student.episodes import counts, evaluate_gaits, other_gaits
 from experiments.student.phase import (
     Estimate,

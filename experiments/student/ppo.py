@@ -12,8 +12,7 @@ from stable_baselines3.common.vec_env import VecEnv
 import trainers
 from experiments import plots
 from experiments.agents import STUDENT, Agent, shipped
-from experiments.results import Results
-from experiments.stats import Group
+from experiments.results import Group, Results
 from experiments.student.episodes import counts
 from experiments.study import Cell, Metrics, Study, digest, sources
 from experiments.tables import mean, share

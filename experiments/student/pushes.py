@@ -8,11 +8,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from experiments import plots
-from experiments.agents import STUDENT, Agent, shipped, tasks_of, with_expert
+from experiments.agents import Agent, tasks_of, with_expert
 from experiments.pushing import CRUISE, DIRECTIONS, PAIRS, push_w, weaker
-from experiments.results import Results
+from experiments.results import Group, Results
 from experiments.searches import climb
-from experiments.stats import Group
 from experiments.study import EVALUATION_CODE, Cell, Metrics, Study, option
 from experiments.tables import Column
 from go1_mtl_gym import TASKS
@@ -64,7 +63,7 @@ class Pushes(Study):
     takes_policies = True
 
     def agents(self) -> list[Agent]:
-        return with_expert(self.policies or [shipped(STUDENT, "clocked")])
+        return with_expert(self.policies)
 
     def cells(self, agent: Agent) -> list[Cell]:
         return [Cell(task, direction) for task in tasks_of(agent) for direction in self.options.directions]

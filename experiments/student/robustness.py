@@ -8,9 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from experiments import plots
-from experiments.agents import EXPERT, STUDENT, Agent, shipped, tasks_of, with_expert
-from experiments.results import Record, Results, distinct
-from experiments.stats import group
+from experiments.agents import EXPERT, Agent, tasks_of, with_expert
+from experiments.results import Record, Results, distinct, group
 from experiments.student.episodes import drawn
 from experiments.study import EVALUATION_CODE, Cell, Metrics, Study, option
 from experiments.tables import Column, share, table
@@ -60,7 +59,7 @@ class Robustness(Study):
     takes_policies = True
 
     def agents(self) -> list[Agent]:
-        return with_expert(self.policies or [shipped(STUDENT, "clocked")])
+        return with_expert(self.policies)
 
     def cells(self, agent: Agent) -> list[Cell]:
         return [Cell(task, quantity) for task in tasks_of(agent) for quantity in self.options.quantities]

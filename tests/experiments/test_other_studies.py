@@ -17,7 +17,7 @@ from experiments.new_gaits import learning
 from experiments.new_gaits import study as new_gaits
 from experiments.paper import networks, settings
 from experiments.paper import study as paper
-from experiments.stats import Group
+from experiments.results import Group
 from experiments.study import Cell
 from experiments.training_runs import TrainedPolicy, TrainingRun, changed
 from go1_mtl_gym import TASKS, InvalidInputError

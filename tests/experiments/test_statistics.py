@@ -4,8 +4,9 @@ import math
 
 import pytest
 
+from experiments.results import Group, group
 from experiments.searches import climb, scouted
-from experiments.stats import Group, Rate, drops, estimate, group
+from experiments.stats import Rate, drops, estimate
 from experiments.tables import count, estimated, judged, spans
 
 RECORDS = [
