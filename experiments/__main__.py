@@ -2,6 +2,8 @@
 
 import argparse
 import dataclasses
+import inspect
+import os
 import shlex
 import sys
 from collections.abc import Sequence
@@ -12,30 +14,18 @@ from experiments.agents import policy_files
 from experiments.catalog import STUDIES, study_class
 from experiments.plots import save_figure
 from experiments.publish import publish_command
-from experiments.results import Results
-from experiments.study import CACHE, Study, default_jobs, run, summary_line, with_options
+from experiments.results import Results, without_folders
+from experiments.running import run
+from experiments.study import CACHE, Study
 from go1_mtl_gym.validation import number_in
 from trainers.utils import cli
 
 OUT = CACHE / "results"
-FOLDERS = ("--out", "--cache")
-"""Options that say where files go on this machine."""
-CHECKOUTS = ("--go2-convex-mpc",)
-"""Options whose value is a path of this machine."""
 
 
-def without_folders(arguments: list[str]) -> str:
-    """The command of these arguments, without what only its machine knows."""
-    words, kept = iter(arguments), []
-    for word in words:
-        name, given, _ = word.partition("=")
-        if name in (*FOLDERS, *CHECKOUTS):
-            if not given:
-                next(words, None)
-            kept += [name, "PATH"] if name in CHECKOUTS else []
-        else:
-            kept.append(word)
-    return shlex.join(["python", "-m", "experiments", *kept])
+def summary_line(study: type[Study]) -> str:
+    """What a study is about: the first line of its docstring."""
+    return (inspect.getdoc(study) or study.title).splitlines()[0]
 
 
 def study_parser(name: str) -> argparse.ArgumentParser:
@@ -45,7 +35,7 @@ def study_parser(name: str) -> argparse.ArgumentParser:
     add = parser.add_argument
     add("--quick", action="store_true", help="little of everything, to see that everything works")
     add("--seed", type=int, default=1, help="of commands, resets, noise and pushes; %(default)s")
-    add("--n-jobs", type=int, default=default_jobs(), help="processes")
+    add("--n-jobs", type=int, default=os.cpu_count() or 1, help="processes")
     add("--only", nargs="+", default=[], help="agents, tasks and conditions; all if not given")
     add("--add", action="store_true", help="keep records of the results file that this run does not replace")
     add("--out", type=Path, default=OUT, help="folder of the results and the picture; %(default)s")
@@ -80,8 +70,9 @@ def study_of(name: str, options: argparse.Namespace) -> Study:
     number_in(options.seed, 0, 2**31 - 1, "seed")
     number_in(options.n_jobs, 1, 1024, "n_jobs")
     fields = [field.name for field in dataclasses.fields(cls.full)]
-    given = {name: getattr(options, name) for name in fields if getattr(options, name, None) is not None}
-    chosen = with_options(cls.quick if options.quick else cls.full, given)
+    given = {name: value for name in fields if (value := getattr(options, name, None)) is not None}
+    given = {name: tuple(value) if isinstance(value, list) else value for name, value in given.items()}
+    chosen = dataclasses.replace(cls.quick if options.quick else cls.full, **given)
     return cls(chosen, policy_files(getattr(options, "policy", [])), options.cache)
 
 
@@ -90,7 +81,7 @@ def run_command(name: str, arguments: list[str]) -> None:
     study_class(name)
     options = study_parser(name).parse_args(arguments)
     study = study_of(name, options)
-    command = without_folders(["run", name, *arguments])
+    command = without_folders(shlex.join(["python", "-m", "experiments", "run", name, *arguments]))
     try:
         results = run(study, options.seed, options.n_jobs, command, options.only)
     except KeyboardInterrupt as interrupt:

@@ -22,7 +22,7 @@ TRAINING_WORLD = ("randomization", "noise", *EXPERT_ONLY, *(each.name for each i
 
 @dataclass(frozen=True)
 class Agent:
-    """A name alone: of a method, whose study trains and measures its policies in one cell.
+    """A name alone: the environment's expert, or a method, whose study trains and measures its policies in one cell.
 
     Attributes:
         name: in records and tables.
@@ -55,19 +55,8 @@ class Agent:
         return 0.0
 
     def load(self) -> Any:
-        """What is measured."""
+        """What is measured; a name alone is the expert's, as `trainers.evaluate` takes it."""
         return self.name
-
-
-@dataclass(frozen=True)
-class Expert(Agent):
-    """The environment's own expert."""
-
-    name: str = EXPERT
-
-    def load(self) -> str:
-        """As `trainers.evaluate` takes it."""
-        return EXPERT
 
 
 @dataclass(frozen=True)
@@ -91,7 +80,6 @@ class PolicyFile(Agent):
         return repr((self.sha256, self.seed))
 
     def load(self) -> Any:
-        """The policy, for an environment without the `TRAINING_WORLD`."""
         policy = trainers.load(self.path)
         extra = policy.extra_env_kwargs
         policy.extra_env_kwargs = {name: value for name, value in extra.items() if name not in TRAINING_WORLD}
@@ -121,21 +109,21 @@ def policy_files(words: Sequence[str]) -> tuple[PolicyFile, ...]:
 
 
 def with_expert(policies: Sequence[Agent]) -> list[Agent]:
-    """The policies and, last, the expert in an environment of the same tasks, control rate and gains.
+    """The policies (none: the shipped one) and, last, the expert in an environment of equal tasks, rate and gains.
 
     Raises:
         InvalidInputError: if the policies' environments differ in these.
     """
-    shared = []
+    shared, policies = [], policies or [shipped(STUDENT, "clocked")]
     for agent in policies:
         kwargs = {"tasks": tuple(TASKS)} | agent.load().env_kwargs
         shared.append({key: kwargs[key] for key in SHARED if key in kwargs})
     if any(kwargs != shared[0] for kwargs in shared):
         raise InvalidInputError(f"expected policies for the same {', '.join(SHARED)}, got {shared}")
-    return [*policies, Expert(env_kwargs=shared[0])]
+    return [*policies, Agent(EXPERT, env_kwargs=shared[0])]
 
 
 def tasks_of(agent: Agent) -> tuple[str, ...]:
     """The gaits that an agent knows, in the order of its environment."""
-    kwargs = agent.env_kwargs if isinstance(agent, Expert) else agent.load().env_kwargs
+    kwargs = agent.env_kwargs if agent.name == EXPERT else agent.load().env_kwargs
     return tuple(kwargs.get("tasks") or TASKS)

@@ -1,6 +1,7 @@
 """Every study by name, imported when it is asked for."""
 
 from importlib import import_module
+from typing import Any
 
 from experiments.study import Study
 from go1_mtl_gym.validation import one_of
@@ -34,11 +35,16 @@ STUDIES = {
 """Name -> module and class."""
 
 
+def resolve(place: str) -> Any:
+    """What "module:name" stands for."""
+    module, _, name = place.partition(":")
+    return getattr(import_module(module), name)
+
+
 def study_class(name: str) -> type[Study]:
     """The class of a study.
 
     Raises:
         InvalidInputError: if there is no study of that name.
     """
-    module, _, cls = STUDIES[one_of(name, tuple(STUDIES), "study")].partition(":")
-    return getattr(import_module(module), cls)
+    return resolve(STUDIES[one_of(name, tuple(STUDIES), "study")])

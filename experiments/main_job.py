@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from experiments.results import Results, distinct
-from experiments.stats import Group
 from experiments.tables import count, markdown, number
 from go1_mtl_gym import TASKS
 from go1_mtl_gym.errors import InvalidInputError
@@ -53,7 +52,7 @@ def summary_table(results: Results) -> str:
     """One row per gait: the expert beside the policy."""
     rows = []
     for task in distinct(results.records, "task"):
-        both = [Group(results.of(task=task, agent=agent)) for agent in (EXPERT, STUDENT)]
+        both = [results.of(task=task, agent=agent) for agent in (EXPERT, STUDENT)]
         cells = [count(members.rate()) for members in both]
         for key, how in (("velocity_error", ".3f"), ("step_rate", ".2f")):
             cells += [number(members.mean(key), how) for members in both]

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 
-from experiments.stats import Group, Rate
+from experiments.results import Group, Record, group
+from experiments.stats import Rate
 
 BLUE, RED, GREEN, PURPLE, YELLOW = "#2166ac", "#d6604d", "#1b9e77", "#7570b3", "#e6ab02"
 STUDENTS = (BLUE, GREEN, PURPLE, YELLOW)
@@ -28,6 +29,27 @@ def new_figure(width: float, height: float) -> Figure:
     figure = Figure(figsize=(width, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
+
+
+def grid(
+    count: int, columns: int, panel: tuple[float, float], margin: tuple[float, float], **options: Any
+) -> tuple[Figure, np.ndarray]:
+    """A figure and its axes, at most so many side by side; those that are not needed are hidden.
+
+    Args:
+        count: of panels.
+        columns: at most.
+        panel: width and height of each [inch].
+        margin: width and height of what is around them [inch].
+        **options: of `Figure.subplots`.
+    """
+    columns = max(1, min(columns, count))
+    rows = max(1, math.ceil(count / columns))
+    figure = new_figure(panel[0] * columns + margin[0], panel[1] * rows + margin[1])
+    axes = figure.subplots(rows, columns, squeeze=False, **options)
+    for ax in axes.flat[count:]:
+        ax.set_axis_off()
+    return figure, axes
 
 
 def save_figure(figure: Figure, path: Path) -> Path:
@@ -87,6 +109,12 @@ def dots(panels: Mapping[str, Mapping[str, Mapping[str, Rate | float | None]]], 
     if len(names) > 1:
         legend(figure, axes)
     return figure
+
+
+def panel(records: Iterable[Record], series: str, row: str, value: Callable[[Group], Any]) -> dict[str, dict[str, Any]]:
+    """A panel of `dots`: values of one key as series, those of another as rows."""
+    of_series = group(records, series).items()
+    return {name: {label: value(each) for label, each in group(members, row).items()} for name, members in of_series}
 
 
 def _dot(ax: Axes, value: Rate | float | None, height: float, color: str, label: str) -> None:

@@ -4,16 +4,14 @@ Nothing in them is typed by hand; ``--check`` fails when what is committed is ou
 """
 
 import argparse
-import shlex
 import shutil
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 
 from experiments import main_job
-from experiments.catalog import STUDIES, study_class
+from experiments.catalog import STUDIES, resolve, study_class
 from experiments.plots import save_figure
-from experiments.results import Results, read_json
+from experiments.results import Results, read_json, without_folders
 from experiments.tables import markdown
 from go1_mtl_gym.errors import InvalidInputError
 from trainers.utils.files import write_atomically
@@ -44,11 +42,6 @@ class Page:
     studies: str
     about: str
     lead: str = ""
-
-    def leading(self, measured: dict[str, Results]) -> list[str]:
-        """The paragraphs above the studies."""
-        module, _, function = self.lead.partition(":")
-        return getattr(import_module(module), function)(measured) if module else []
 
 
 PAGES = {
@@ -85,7 +78,7 @@ def page(name: str, folder: Path) -> str | None:
             sections += section(study, measured[study], folder)
     if not measured:
         return None
-    lead = [f"# {about.title}", GENERATED, about.about, *about.leading(measured)]
+    lead = [f"# {about.title}", GENERATED, about.about, *(resolve(about.lead)(measured) if about.lead else [])]
     return "\n\n".join([*lead, *sections, *how_it_was_made([*measured.values()])]) + "\n"
 
 
@@ -178,24 +171,13 @@ def copy_run(run: Path, root: Path) -> None:
     preset = metrics.get("config", {}).get("preset")
     if preset != PUBLISHED_PRESET:
         raise InvalidInputError(f"a run of the preset {PUBLISHED_PRESET!r} was expected, {run} is one of {preset!r}")
-    results = main_job.results_of(metrics, without_out(metrics.get("command", "")))
+    results = main_job.results_of(metrics, without_folders(metrics.get("command", "")))
     results.write(folder / f"{main_job.NAME}.json")
     for name in COPIED:
         shutil.copyfile(run / name, folder / name)
     assets.mkdir(parents=True, exist_ok=True)
     for name, published in POLICIES.items():
         shutil.copyfile(run / name, assets / published)
-
-
-def without_out(command: str) -> str:
-    """A command without its option ``--out``."""
-    words, kept = iter(shlex.split(command)), []
-    for word in words:
-        if word == "--out":
-            next(words, None)
-        elif not word.startswith("--out="):
-            kept.append(word)
-    return shlex.join(kept)
 
 
 def publish_command(arguments: list[str], root: Path = ROOT) -> None:

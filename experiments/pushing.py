@@ -4,6 +4,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from experiments.results import Record
+
 DIRECTIONS = {"left": (0.0, 1.0), "right": (0.0, -1.0), "forward": (1.0, 0.0), "backward": (-1.0, 0.0)}
 """Where a push goes, in the heading frame."""
 PAIRS = {"lateral": ("left", "right"), "fore-aft": ("forward", "backward")}
@@ -24,6 +26,6 @@ def push_w(direction: str, size: float, yaw: float) -> tuple[float, float, float
     return size * (cos * x - sin * y), size * (sin * x + cos * y), 0.0
 
 
-def weaker(largest: dict[str, float], pair: Iterable[str]) -> float | None:
+def weaker(records: Iterable[Record], pair: Iterable[str]) -> float | None:
     """The smaller of two directions' largest pushes [m/s], of those that were measured."""
-    return min((largest[name] for name in pair if name in largest), default=None)
+    return min((record["largest"] for record in records if record["condition"] in pair), default=None)

@@ -3,16 +3,60 @@
 import json
 import os
 import platform
+import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from experiments.stats import Rate
 from go1_mtl_gym.errors import InvalidInputError
 from trainers.utils.files import json_ready, write_atomically
 
 Record = dict[str, Any]
 """{"study", "agent", "task", "condition", "seed", metrics ...}."""
+
+
+class Group(tuple[Record, ...]):
+    """Some records, taken together."""
+
+    def where(self, **values: Any) -> "Group":
+        """The records that have these values."""
+        return Group(record for record in self if all(record.get(name) == value for name, value in values.items()))
+
+    def total(self, key: str) -> int:
+        """Sum over the records that have it."""
+        return sum(self.values(key))
+
+    def rate(self, key: str = "succeeded") -> Rate:
+        """A count of the "trials" of those records that have both."""
+        known = [record for record in self if record.get(key) is not None]
+        return Rate(sum(record[key] for record in known), sum(record["trials"] for record in known))
+
+    def values(self, key: str) -> list[float]:
+        """The values that are there."""
+        return [record[key] for record in self if record.get(key) is not None]
+
+    def mean(self, key: str) -> float | None:
+        """Mean of the values that are there; None if there are none."""
+        known = self.values(key)
+        return float(np.mean(known)) if known else None
+
+    def largest(self, key: str) -> float | None:
+        """The largest value; None if there is no record, or one without: that would have been the worst."""
+        known = self.values(key)
+        return max(known) if self and len(known) == len(self) else None
+
+
+def group(records: Iterable[Record], by: str | Sequence[str]) -> dict[Any, Group]:
+    """The records by the values of one key, or by the tuples of values of several; keys that are missing are None."""
+    groups: dict[Any, list[Record]] = {}
+    for record in records:
+        key = record.get(by) if isinstance(by, str) else tuple(record.get(name) for name in by)
+        groups.setdefault(key, []).append(record)
+    return {key: Group(members) for key, members in groups.items()}
 
 
 @dataclass(frozen=True)
@@ -82,9 +126,9 @@ class Results:
         seconds = {name: earlier.seconds.get(name, 0.0) + value for name, value in self.seconds.items()}
         return replace(self, records=(*kept, *self.records), command=command, seconds=seconds)
 
-    def of(self, **values: Any) -> list[Record]:
+    def of(self, **values: Any) -> Group:
         """The records that have these values, in their order."""
-        return [record for record in self.records if all(record.get(name) == v for name, v in values.items())]
+        return Group(self.records).where(**values)
 
 
 def read_json(path: Path) -> dict[str, Any]:
@@ -102,6 +146,24 @@ def read_json(path: Path) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise InvalidInputError(f"{path} must hold a JSON object, got {type(value).__name__}")
     return value
+
+
+FOLDERS, CHECKOUTS = ("--out", "--cache"), ("--go2-convex-mpc",)
+"""Options that say where files go on this machine, and whose value is a path of this machine."""
+
+
+def without_folders(command: str) -> str:
+    """A command without what only its machine knows."""
+    words, kept = iter(shlex.split(command)), []
+    for word in words:
+        name, given, _ = word.partition("=")
+        if name in (*FOLDERS, *CHECKOUTS):
+            if not given:
+                next(words, None)
+            kept += [name, "PATH"] if name in CHECKOUTS else []
+        else:
+            kept.append(word)
+    return shlex.join(kept)
 
 
 def distinct(records: Iterable[Record], key: str) -> list[Any]:

@@ -7,18 +7,8 @@ Passes = Callable[[float], bool]
 """Whether a level is withstood."""
 
 
-def climb(levels: Sequence[float], passes: Passes) -> float:
-    """The largest level below the first that does not pass, from the smallest upward; 0 if that is the smallest."""
-    largest = 0.0
-    for level in levels:
-        if not passes(level):
-            break
-        largest = level
-    return largest
-
-
-def climb_from(first: float, step: float, steps: int, passes: Passes) -> float:
-    """`climb` from a level that is likely to pass; where it does not, the largest below it that does, or 0.
+def climb(first: float, step: float, steps: int, passes: Passes) -> float:
+    """The last level that passes, upward from a likely one; where that does not pass, the next below that does, or 0.
 
     Args:
         first: level that is tried first.
@@ -26,10 +16,15 @@ def climb_from(first: float, step: float, steps: int, passes: Passes) -> float:
         steps: largest number of levels above the first.
         passes: whether a level passes.
     """
-    if passes(first):
-        return climb([round(first + k * step, 6) for k in range(1, steps + 1)], passes) or first
-    lower = [round(first - k * step, 6) for k in range(1, round(first / step))]
-    return next((level for level in lower if passes(level)), 0.0)
+    if not passes(first):
+        lower = [round(first - k * step, 6) for k in range(1, round(first / step))]
+        return next((level for level in lower if passes(level)), 0.0)
+    largest = first
+    for level in (round(first + k * step, 6) for k in range(1, steps + 1)):
+        if not passes(level):
+            break
+        largest = level
+    return largest
 
 
 def scouted(

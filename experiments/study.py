@@ -1,35 +1,23 @@
-"""The frame of every study: agents, cells, a cache of finished cells on disk, and a run that goes on where it stopped.
-
-A study is one class: its options with a quick variant, who is measured, in what, how, and how that is shown.
-"""
+"""What a study is: its options with a quick variant, who is measured, in what, how, and how that is shown."""
 
 import abc
 import hashlib
 import importlib.util
-import inspect
-import json
-import os
 import re
-import time
-from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar
 
-import joblib
 from matplotlib.figure import Figure
-from threadpoolctl import threadpool_limits
-from tqdm.auto import tqdm
 
 from experiments.agents import Agent
-from experiments.results import Record, Results, machine
+from experiments.results import Record, Results, distinct, group
+from experiments.tables import Column, table
 from go1_mtl_gym.errors import InvalidInputError
-from trainers.algorithms.optimizer import torch_threads
-from trainers.data.environments import WithTasks
 from trainers.policies.checkpoint import versions
-from trainers.utils.files import json_ready, write_json
-from trainers.utils.processes import keep_interrupts
+from trainers.utils.files import json_ready
 
 CACHE = Path("runs/experiments")
 """Where finished cells, demonstrations and policies are kept."""
@@ -90,6 +78,10 @@ class Study(abc.ABC):
     """What its picture shows; empty if it has none."""
     more_captions: ClassVar[dict[str, str]] = {}
     """End of a file's name -> what that picture shows, see `more_figures`."""
+    rows: ClassVar[Mapping[str, str]] = {}
+    """Key of the records -> header: what a row of the table is about. Rows are in the order of the first key."""
+    columns: ClassVar[Mapping[str, Column]] = {}
+    """Header -> what writes the cell of a row's records."""
     keys: ClassVar[tuple[str, ...]] = ("agent", "task", "condition", "seed")
     """What tells one record from another."""
     full: ClassVar[Any]
@@ -120,9 +112,16 @@ class Study(abc.ABC):
             seed: of the evaluation.
         """
 
-    @abc.abstractmethod
     def table(self, results: Results) -> str:
         """The results in Markdown."""
+        return self.table_of(results.records)
+
+    def table_of(self, records: Sequence[Record]) -> str:
+        """`rows` and `columns` of some records."""
+        first = next(iter(self.rows))
+        order = distinct(records, first)
+        in_order = sorted(records, key=lambda record: order.index(record[first]))
+        return table(group(in_order, [*self.rows]), [*self.rows.values()], self.columns)
 
     def paragraphs(self, results: Results) -> list[str]:
         """The section of a page, between its heading and the picture."""
@@ -172,6 +171,11 @@ class Study(abc.ABC):
         return digest((*words, code_digest((type(self).__module__, *self.code)), repr(versions())))
 
 
+def option(default: Any, about: str) -> Any:
+    """A field of a study's options, and what ``--help`` says of it."""
+    return field(default=default, metadata={"about": about})
+
+
 def digest(words: Iterable[str]) -> str:
     """12 hexadecimal digits that change with any of the words."""
     total = hashlib.sha256()
@@ -200,119 +204,3 @@ def sources(name: str) -> str:
 def code_digest(names: tuple[str, ...]) -> str:
     """A digest of the `sources` of some modules and packages."""
     return digest(map(sources, names))
-
-
-# -- Running -----------------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Measurement:
-    """One cell to be measured; picklable."""
-
-    study: Study
-    agent: Agent
-    cell: Cell
-    seed: int
-
-    def __call__(self) -> dict[str, Any]:
-        """{"records", "seconds"}: read if the cell is finished, else measured on one thread and written."""
-        path = self.study.cell_path(self.agent, self.cell, self.seed)
-        if path.is_file():
-            return json.loads(path.read_text(encoding="utf-8"))
-        start = time.monotonic()
-        with threadpool_limits(1), torch_threads(1):
-            metrics = self.study.measure(self.agent, self.cell, self.seed)
-        records = [self._head() | each for each in (metrics if isinstance(metrics, list) else [metrics])]
-        finished = json_ready({"records": records, "seconds": round(time.monotonic() - start, 2)})
-        write_json(path, finished)
-        return finished
-
-    def _head(self) -> Record:
-        seeds = (self.agent.seed, self.cell.seed, self.seed)
-        return {
-            "study": self.study.name,
-            "agent": self.agent.name,
-            "task": self.cell.task,
-            "condition": self.cell.condition,
-            "seed": next(seed for seed in seeds if seed is not None),
-        }
-
-
-def run(study: Study, seed: int, n_jobs: int = 1, command: str = "", only: Sequence[str] = ()) -> Results:
-    """Measure what is not measured yet, in processes side by side, one thread each.
-
-    Args:
-        study: which.
-        seed: of the evaluation.
-        n_jobs: processes.
-        command: that this is the answer to.
-        only: names of agents, tasks and conditions; a cell is left out if none of its own is among them.
-
-    Raises:
-        InvalidInputError: if `only` leaves nothing to measure.
-    """
-    agents = list(study.agents())
-    chosen = [(agent, cell) for agent in agents for cell in study.cells(agent) if _is_in(agent, cell, only)]
-    if not chosen:
-        raise InvalidInputError(f"{' '.join(only) or 'this'} leaves nothing to measure in {study.name}")
-    agents = [agent for agent in agents if any(agent is other for other, _ in chosen)]
-    origins = {agent.origin: agent.prepare for agent in agents if agent.origin is not None}
-    training_s = _side_by_side([*origins.values()], n_jobs, f"{study.name}: training")
-    measurements = [Measurement(study, agent, cell, seed) for agent, cell in chosen]
-    paths = [study.cell_path(each.agent, each.cell, seed) for each in measurements]
-    if not all(path.is_file() for path in paths):
-        study.prepare(n_jobs)
-    finished = _side_by_side(measurements, 1 if study.alone else n_jobs, study.name)
-    seconds = {"training": sum(training_s), "cells": sum(each["seconds"] for each in finished)}
-    return Results(
-        study=study.name,
-        command=command,
-        seed=seed,
-        options=study.published_options(),
-        versions=versions(),
-        machine=machine(getattr(study.options, "device", "cpu")),
-        seconds={name: round(value, 1) for name, value in seconds.items() if value},
-        records=tuple(record for each in finished for record in each["records"]),
-        policies={agent.label: agent.sha256 for agent in agents if hasattr(agent, "sha256")},
-        more=json_ready(study.more()),
-    )
-
-
-def _is_in(agent: Agent, cell: Cell, only: Sequence[str]) -> bool:
-    if agent.conditions and cell.condition not in agent.conditions:
-        return False
-    return not only or not {agent.name, cell.task, cell.condition}.isdisjoint(only)
-
-
-def _side_by_side(calls: Sequence[Any], n_jobs: int, title: str) -> list[Any]:
-    if n_jobs == 1 or len(calls) < 2:
-        results = (call() for call in calls)
-    else:
-        parallel = joblib.Parallel(n_jobs=n_jobs, return_as="generator")
-        with keep_interrupts():
-            results = parallel(joblib.delayed(WithTasks(call))() for call in calls)
-    return list(tqdm(results, title, len(calls), unit="cell", disable=None if calls else True))
-
-
-# -- Options -----------------------------------------------------------------------------------------------------------
-
-
-def option(default: Any, about: str) -> Any:
-    """A field of a study's options, and what ``--help`` says of it."""
-    return field(default=default, metadata={"about": about})
-
-
-def with_options(options: Any, given: dict[str, Any]) -> Any:
-    """Options with some of their fields replaced; lists become tuples."""
-    values = {name: tuple(value) if isinstance(value, list) else value for name, value in given.items()}
-    return replace(options, **values)
-
-
-def default_jobs() -> int:
-    """As many processes as there are cores."""
-    return os.cpu_count() or 1
-
-
-def summary_line(study: type[Study]) -> str:
-    """What a study is about: the first line of its docstring."""
-    return (inspect.getdoc(study) or study.title).splitlines()[0]

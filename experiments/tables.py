@@ -4,12 +4,14 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from experiments.stats import Estimate, Group, Rate
+from experiments.results import Group
+from experiments.stats import Estimate, Rate
 from go1_mtl_gym.validation import one_of
 from trainers.utils.report import markdown, number
 
 __all__ = [
-    "count", "estimated", "judged", "markdown", "mean", "number", "percent", "settings", "share", "spans", "table",
+    "count", "estimated", "first", "judged", "markdown", "mean", "number", "percent", "settings", "share", "spans",
+    "table",
 ]  # fmt: skip
 Column = Callable[[Group], str]
 """Writes the cell of some records."""
@@ -44,6 +46,11 @@ def share(key: str = "succeeded", target: float = 0.0, **where: Any) -> Column:
 def mean(key: str, how: str, **where: Any) -> Column:
     """A column of means of the records that have some values; "-" where there is none."""
     return lambda members: number(members.where(**where).mean(key), how)
+
+
+def first(key: str, how: str) -> Column:
+    """A column of the first record's list of numbers; "-" without."""
+    return lambda members: " ".join(f"{value:{how}}" for value in members[0].get(key, ())) or "-"
 
 
 def percent(rate: Rate) -> str:

@@ -14,6 +14,7 @@ from experiments.study import TRAINING_CODE, code_digest, digest
 from trainers.algorithms.optimizer import torch_threads
 from trainers.pipeline.config import JobConfig
 from trainers.pipeline.job import Job
+from trainers.pipeline.new_policy import new_policy
 from trainers.policies.checkpoint import versions
 from trainers.utils.files import write_json
 
@@ -21,6 +22,20 @@ UNUSED = ("preset", "n_envs", "device", "threads", "episodes", "video_s")
 """Settings of the main job that its policies do not depend on, run as here."""
 HELD_OUT = "held_out.json"
 """File of the one-step errors on held-out rows, and of the time; the last that a run writes."""
+
+QUICK_JOB = {
+    "tasks": ("trot", "bound"),
+    "width": 64,
+    "batch_size": 256,
+    "shard_s": 2.0,
+    "clean_s": 2.0,
+    "perturbed_s": 2.0,
+    "held_out_s": 2.0,
+    "clone_steps": 60,
+    "episodes": 1,
+    "episode_s": 2.5,
+}
+"""Settings of the main job where a quick run of a study trains with some of its parts."""
 
 
 @dataclass(frozen=True)
@@ -68,10 +83,12 @@ class TrainingRun:
         """
         if not (self.folder / HELD_OUT).is_file():
             self.folder.mkdir(parents=True, exist_ok=True)
-            with open(self.folder / "progress.log", "a", encoding="utf-8") as log, contextlib.ExitStack() as stack:
-                stack.enter_context(torch_threads(1))
-                stack.enter_context(contextlib.redirect_stderr(log))
-                stack.enter_context(contextlib.redirect_stdout(log))
+            with (
+                open(self.folder / "progress.log", "a", encoding="utf-8") as log,
+                torch_threads(1),
+                contextlib.redirect_stderr(log),
+                contextlib.redirect_stdout(log),
+            ):
                 self._train()
         return self._finished()["seconds"]
 
@@ -93,13 +110,13 @@ class TrainedPolicy(PolicyFile):
     """A policy of a training run, which is made before anything is measured.
 
     Attributes:
-        run: that makes it; two agents may be of one.
+        run: a `TrainingRun`, or what else has a method `make`; two agents may be of one.
     """
 
-    run: TrainingRun = field(kw_only=True)
+    run: Any = field(kw_only=True)
 
     @property
-    def origin(self) -> TrainingRun:
+    def origin(self) -> Any:
         """The run."""
         return self.run
 
@@ -125,6 +142,13 @@ def rows_of(jobs: Sequence[trainers.CollectJob], folder: Path) -> trainers.Demon
     """The rows of some demonstrations; those that are not in the folder yet are made."""
     paths = trainers.collect_all(jobs, folder / "demonstrations")
     return trainers.Demonstrations.concatenate([trainers.Demonstrations.load(path) for path in paths])
+
+
+def cloned(job: JobConfig, rows: trainers.Demonstrations) -> trainers.MultiHeadPolicy:
+    """A new policy of a job that has learned from some rows by behavior cloning."""
+    policy = new_policy(job, job.env_kwargs)
+    trainers.train_bc(policy, rows, job.bc)
+    return policy
 
 
 def kept_policy(path: Path, train: Callable[[], Any]) -> Any:

@@ -1,7 +1,6 @@
 """How fast is the expert, next to itself with exact QP solvers and next to a public controller of its kind?"""
 
 import sys
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,9 +10,9 @@ import numpy as np
 
 from experiments.agents import Agent
 from experiments.benchmarks.peers import Go2ConvexMPC
+from experiments.expert.timing import elapsed, quantiles
 from experiments.pushing import CRUISE
-from experiments.results import Results
-from experiments.stats import group
+from experiments.results import Results, group
 from experiments.study import Cell, Metrics, Study, option
 from experiments.tables import mean, table
 from experts import MPCConfig, NMPCConfig, NMPCExpert
@@ -84,19 +83,13 @@ class ExpertBenchmark(Study):
             for name, call in calls.items():
                 for scope, seconds in call(state).items():
                     if i >= WARM_UP:
-                        times.setdefault((name, scope), []).append(1e3 * seconds)
+                        times.setdefault((name, scope), []).append(seconds)
             for name, error in force_errors(calls).items():
                 errors.setdefault(name, []).append(error)
-        medians = {key: float(np.median(values)) for key, values in times.items()}
-        records = [
-            {
-                "agent": name,
-                "condition": scope,
-                "median_ms": medians[name, scope],
-                "p99_ms": float(np.quantile(values, 0.99)),
-                "ratio": medians[name, scope] / medians[OURS, scope],
-            }
-            for (name, scope), values in times.items()
+        shown = {key: quantiles(values) for key, values in times.items()}
+        records: list[dict[str, Any]] = [
+            {"agent": name, "condition": scope, **ms, "ratio": ms["median_ms"] / shown[OURS, scope]["median_ms"]}
+            for (name, scope), ms in shown.items()
         ]
         forces = {name: {"median_n": np.median(v), "largest_n": np.max(v)} for name, v in errors.items()}
         return records + [{"agent": name, "condition": FORCE_ERROR, **error} for name, error in forces.items()]
@@ -156,10 +149,10 @@ class Ours:
     def __call__(self, state: RobotState) -> dict[str, float]:
         """Seconds of every scope."""
         dynamics, mpc = self.expert._model.dynamics(state), self.expert._mpc
-        update = _seconds(lambda: self.expert.forces(state, dynamics))
-        data = _seconds(lambda: mpc.program.update(*self.problem))
-        both = _seconds(lambda: mpc.solve(*self.problem))
-        return {"qp": both - data, "update": update, "action": _seconds(lambda: self.expert.action(state))}
+        update = elapsed(lambda: self.expert.forces(state, dynamics))
+        data = elapsed(lambda: mpc.program.update(*self.problem))
+        both = elapsed(lambda: mpc.solve(*self.problem))
+        return {"qp": both - data, "update": update, "action": elapsed(lambda: self.expert.action(state))}
 
 
 def contestants(options: ExpertOptions) -> dict[str, Call]:
@@ -184,9 +177,3 @@ def force_errors(calls: dict[str, Call]) -> dict[str, float]:
     ours = {name: call.solution.forces_w for name, call in calls.items() if isinstance(call, Ours)}
     exact = next((ours[f"ours, {name}"] for name in EXACT if f"ours, {name}" in ours), None)
     return {} if exact is None else {name: float(np.abs(forces - exact).max()) for name, forces in ours.items()}
-
-
-def _seconds(call: Callable[[], Any]) -> float:
-    start = time.perf_counter()
-    call()
-    return time.perf_counter() - start

@@ -5,8 +5,7 @@ from collections.abc import Callable, Iterator, Mapping
 from experiments.agents import Agent
 from experiments.benchmarks import rows, steps
 from experiments.benchmarks.turns import RATE, Heat, TrainingOptions, run
-from experiments.results import Results
-from experiments.stats import Group, group
+from experiments.results import Group, Results, group
 from experiments.study import Cell, Metrics, Study
 from experiments.tables import markdown, spans
 

@@ -6,8 +6,7 @@ from typing import Any
 from experiments.expert.commands import ONE
 from experiments.expert.timing import REAL_TIME, UPDATE
 from experiments.pushing import PAIRS, weaker
-from experiments.results import Record, Results, distinct
-from experiments.stats import Group
+from experiments.results import Group, Record, Results, distinct
 from experiments.tables import count, markdown, number
 
 NOTE = (
@@ -43,11 +42,10 @@ def card(measured: Mapping[str, Results]) -> list[str]:
 
 def _row(gait: str, measured: Mapping[str, Results]) -> list[str]:
     def of(study: str, **values: Any) -> Group:
-        return Group(measured[study].of(task=gait, **values)) if study in measured else Group()
+        return measured[study].of(task=gait, **values) if study in measured else Group()
 
     drawn = of("expert_commands", condition=ONE)
     tracked = {record["condition"]: record["tracked_to"] for record in of("expert_limits")}
-    largest = {record["condition"]: record["largest"] for record in of("expert_pushes")}
     back, forth, vy = (number(tracked.get(axis), ".1f") for axis in ("-vx", "vx", "vy"))
     return [
         gait,
@@ -56,7 +54,7 @@ def _row(gait: str, measured: Mapping[str, Results]) -> list[str]:
         f"{back}, {forth}",
         vy,
         number(tracked.get("yaw"), ".2f"),
-        *(number(weaker(largest, pair), ".1f") for pair in PAIRS.values()),
+        *(number(weaker(of("expert_pushes"), pair), ".1f") for pair in PAIRS.values()),
         count(of("expert_transitions").rate("survived")),
         number(of("expert_timing", condition=UPDATE).mean("median_ms"), ".2f"),
         number(of("expert_timing", condition=REAL_TIME, control_hz=50).mean("expert"), ".1f"),

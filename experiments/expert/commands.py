@@ -1,6 +1,5 @@
 """Drawn commands from a standing start: kept for a whole episode, and changing."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,9 +7,8 @@ import numpy as np
 
 from experiments.expert.lab import ExpertOptions, ExpertStudy, Lab
 from experiments.results import Results
-from experiments.stats import Group, group
 from experiments.study import option
-from experiments.tables import mean, share, table
+from experiments.tables import mean, share
 
 ONE, CHANGING = "one command", "new commands"
 
@@ -29,6 +27,14 @@ class Commands(ExpertStudy):
 
     name = "expert_commands"
     title = "Drawn commands"
+    rows = {"task": "gait"}
+    columns = {
+        "success": share(),
+        "survival": share("survived"),
+        "velocity error [m/s]": mean("velocity_error", ".3f"),
+        "yaw rate error [rad/s]": mean("yaw_rate_error", ".3f"),
+        "steps/s": mean("step_rate", ".2f"),
+    }
     full = CommandOptions()
     quick = CommandOptions(("trot", "jump"), episodes=1, seconds=3.0, change_s=2.0)
 
@@ -40,10 +46,10 @@ class Commands(ExpertStudy):
         return records
 
     def table(self, results: Results) -> str:
-        return closed_loop_table(group(results.of(condition=ONE), "task"))
+        return self.table_of(results.of(condition=ONE))
 
     def paragraphs(self, results: Results) -> list[str]:
-        changing = closed_loop_table(group(results.of(condition=CHANGING), "task"))
+        changing = self.table_of(results.of(condition=CHANGING))
         return [self.table(results), "The same with commands that change:", changing]
 
 
@@ -61,15 +67,3 @@ def episode(record: Any) -> dict[str, Any]:
         "command": record.commands[0],
         "step_rates": record.step_rate,
     }
-
-
-def closed_loop_table(gaits: Mapping[str, Group]) -> str:
-    """One row per gait."""
-    columns = {
-        "success": share(),
-        "survival": share("survived"),
-        "velocity error [m/s]": mean("velocity_error", ".3f"),
-        "yaw rate error [rad/s]": mean("yaw_rate_error", ".3f"),
-        "steps/s": mean("step_rate", ".2f"),
-    }
-    return table(gaits, ["gait"], columns)

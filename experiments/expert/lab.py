@@ -2,7 +2,8 @@
 
 import dataclasses
 from abc import abstractmethod
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable
 from functools import partial
 from typing import Any, ClassVar
 
@@ -10,7 +11,7 @@ import numpy as np
 
 import experts
 import trainers
-from experiments.agents import Agent, Expert
+from experiments.agents import EXPERT, Agent
 from experiments.study import Cell, Metrics, Study, option
 from go1_mtl_gym import TASKS
 from go1_mtl_gym.env import Go1Env
@@ -24,29 +25,12 @@ UNENDING_S = 1e6
 """Length of an episode in which only a fall ends anything [s]."""
 
 
-@dataclasses.dataclass
-class Ledger:
-    """What happened to an expert's answers, over all episodes of a measurement.
-
-    Attributes:
-        calls: of the expert; one control step each.
-        bad_actions: answers with a number that is not finite.
-        unhandled: exceptions that left the expert; the home pose was held instead.
-        inexact_solves, solver_failures, bad_states, iterations: sums of the expert's own `counters`.
-    """
-
-    calls: int = 0
-    bad_actions: int = 0
-    unhandled: int = 0
-    inexact_solves: int = 0
-    solver_failures: int = 0
-    bad_states: int = 0
-    iterations: int = 0
-
-    def add(self, other: "Ledger") -> None:
-        """Add what another ledger holds."""
-        for name, value in vars(other).items():
-            setattr(self, name, getattr(self, name) + value)
+OWN_COUNTERS = ("inexact_solves", "solver_failures", "bad_states", "iterations")
+"""What the expert counts itself, see `NMPCExpert.counters`."""
+ANSWERS = ("calls", "bad_actions", "unhandled")
+"""Control steps, answers with a number that is not finite, and exceptions that left the expert."""
+Ledger = Counter[str]
+"""What happened to an expert's answers, over all episodes of a measurement: `ANSWERS` and `OWN_COUNTERS`."""
 
 
 class CountedExpert:
@@ -74,23 +58,23 @@ class CountedExpert:
 
     def action(self, state: RobotState) -> np.ndarray:
         """Joint targets [rad], shape (12,); the home pose where the expert raised or answered with NaN."""
-        self.ledger.calls += 1
+        self.ledger["calls"] += 1
         try:
             target = np.asarray(self.expert.action(state))
         except Exception:  # whatever it is, it is what this ledger is for
-            self.ledger.unhandled += 1
+            self.ledger["unhandled"] += 1
             return HOME_POSE.copy()
         if not np.isfinite(target).all():
-            self.ledger.bad_actions += 1
+            self.ledger["bad_actions"] += 1
             return HOME_POSE.copy()
         return target
 
     def settle(self) -> None:
         """Move what the expert has counted into the ledger."""
         counters = getattr(self.expert, "counters", None)
-        for name in ("inexact_solves", "solver_failures", "bad_states", "iterations"):
+        for name in OWN_COUNTERS:
             if hasattr(counters, name):
-                setattr(self.ledger, name, getattr(self.ledger, name) + int(getattr(counters, name)))
+                self.ledger[name] += int(getattr(counters, name))
                 setattr(counters, name, 0)
 
 
@@ -127,7 +111,7 @@ class Lab:
     """
 
     def __init__(self, control_hz: int = 50, make_expert: Callable[..., Any] = experts.NMPCExpert) -> None:
-        self.ledger = Ledger()
+        self.ledger = Ledger(dict.fromkeys((*ANSWERS, *OWN_COUNTERS), 0))
         counted = partial(CountedExpert, make_expert, self.ledger)
         self.env = Course(None, control_hz=control_hz, episode_s=UNENDING_S, expert=counted)
 
@@ -146,21 +130,13 @@ class Lab:
         """Stand up with a task and a command (vx, vy [m/s], yaw rate [rad/s]), seeded by `keys`."""
         self.env.reset(seed=derive_seed("lab", task, *keys), options={"task": task, "command": tuple(command)})
 
-    def drive(self, seconds: float) -> Iterator[dict[str, Any]]:
-        """Let the expert walk for some seconds or until a fall; yields the info of every step."""
-        for _ in range(round(seconds * self.env.control_hz)):
-            info = self.step()
-            yield info
-            if info["fallen"]:
-                return
-
     def step(self) -> dict[str, Any]:
         """One control period under the expert; its info."""
         return self.env.step(self.env.expert_action())[4]
 
     def walk(self, seconds: float) -> bool:
-        """`drive`, and whether it stayed up."""
-        return not any(info["fallen"] for info in self.drive(seconds))
+        """Let the expert walk for some seconds or until a fall; returns whether it stayed up."""
+        return not any(self.step()["fallen"] for _ in range(round(seconds * self.env.control_hz)))
 
     def score(
         self, task: str, seconds: float, seed: int, episodes: int = 1, command: Any = None, **options: Any
@@ -199,18 +175,15 @@ class ExpertStudy(Study):
     code: ClassVar[tuple[str, ...]] = ("go1_mtl_gym", "experts", "trainers.evaluation", "experiments.expert")
 
     def agents(self) -> list[Agent]:
-        """The expert."""
-        return [Expert()]
+        return [Agent(EXPERT)]
 
     def cells(self, agent: Agent) -> list[Cell]:
-        """The gaits."""
         return [Cell(task) for task in self.options.tasks]
 
     def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:
-        """Measure in a lab of its own."""
         lab = Lab(self.options.control_hz)
         records = self.measure_in(lab, cell.task, seed)
-        records[0] |= dataclasses.asdict(lab.settle())
+        records[0] |= lab.settle()
         return records
 
     @abstractmethod

@@ -6,14 +6,13 @@ from typing import Any
 import numpy as np
 
 from experiments.expert.lab import ExpertOptions, ExpertStudy, Lab, generator
-from experiments.results import Results
-from experiments.stats import group
 from experiments.study import option
-from experiments.tables import mean, table
+from experiments.tables import mean
 from experts import NMPCExpert
 from experts.phase_fitting import fit_phase
 from experts.robot_model import RobotModel
 from go1_mtl_gym import TASKS
+from go1_mtl_gym.rotations import yaw_matrix
 from go1_mtl_gym.sensing.state import RobotState
 
 
@@ -33,23 +32,21 @@ class Labels(ExpertStudy):
 
     name = "expert_labels"
     title = "Labels"
+    rows = {"task": "gait"}
+    columns = {
+        "states": mean("states", ".0f"),
+        "other bits when asked again": mean("asked_again", ".0f"),
+        "moved and turned [rad]": mean("displaced", ".0e"),
+        "clock wrong by 1/4 [rad]": mean("wrong_clock", ".3f"),
+        "then fitted [rad]": mean("fitted_clock", ".3f"),
+        "error of the fitted clock [cycles]": mean("phase_error", ".3f"),
+        "95 %": mean("phase_error_p95", ".3f"),
+    }
     full = LabelOptions()
     quick = LabelOptions(("trot", "jump"), walks=1, seconds=1.5)
 
     def measure_in(self, lab: Lab, task: str, seed: int) -> list[dict[str, Any]]:
         return [labels(lab, task, self.options, seed)]
-
-    def table(self, results: Results) -> str:
-        columns = {
-            "states": mean("states", ".0f"),
-            "other bits when asked again": mean("asked_again", ".0f"),
-            "moved and turned [rad]": mean("displaced", ".0e"),
-            "clock wrong by 1/4 [rad]": mean("wrong_clock", ".3f"),
-            "then fitted [rad]": mean("fitted_clock", ".3f"),
-            "error of the fitted clock [cycles]": mean("phase_error", ".3f"),
-            "95 %": mean("phase_error_p95", ".3f"),
-        }
-        return table(group(results.records, "task"), ["gait"], columns)
 
 
 def labels(lab: Lab, task: str, options: LabelOptions, seed: int) -> dict[str, Any]:
@@ -102,19 +99,13 @@ def _states(lab: Lab, task: str, options: LabelOptions, seed: int) -> list[Robot
 def _displaced(state: RobotState, rng: np.random.Generator, distance: float) -> RobotState:
     """The same robot somewhere else, facing another way."""
     yaw = rng.uniform(-np.pi, np.pi)
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    turn = np.eye(3)
+    turn[:2, :2] = yaw_matrix(yaw)
     w, x, y, z = state.quat_wxyz
-    half_cos, half_sin = np.cos(yaw / 2), np.sin(yaw / 2)
-    quat = [
-        half_cos * w - half_sin * z,
-        half_cos * x - half_sin * y,
-        half_cos * y + half_sin * x,
-        half_cos * z + half_sin * w,
-    ]
+    quat = np.cos(yaw / 2) * state.quat_wxyz + np.sin(yaw / 2) * np.array([-z, -y, x, w])
     return replace(
         state,
         position_w=turn @ state.position_w + np.array([*rng.uniform(-distance, distance, 2), 0.0]),
-        quat_wxyz=np.array(quat),
+        quat_wxyz=quat,
         linear_velocity_w=turn @ state.linear_velocity_w,
     )

@@ -9,11 +9,10 @@ from matplotlib.figure import Figure
 from experiments import plots
 from experiments.expert.lab import ExpertOptions, ExpertStudy, Lab, generator
 from experiments.pushing import CRUISE, DIRECTIONS, push_w
-from experiments.results import Results
-from experiments.searches import climb_from, scouted
-from experiments.stats import group
+from experiments.results import Results, group
+from experiments.searches import climb, scouted
 from experiments.study import option
-from experiments.tables import mean, table
+from experiments.tables import mean
 from go1_mtl_gym import TASKS
 from trainers.data.environments import derive_seed
 
@@ -52,6 +51,13 @@ class Limits(ExpertStudy):
         f"tracked: mean errors of at most {TRACKED[0]:g} m/s and {TRACKED[1]:g} rad/s."
     )
     caption = "Largest command along each axis"
+    rows = {"task": "gait", "condition": "axis"}
+    columns = {
+        "survived": lambda members: f"{members[0]['survived_to']:g}{' (end of the search)' * members[0]['at_cap']}",
+        "velocity error there [m/s]": mean("velocity_error", ".3f"),
+        "yaw rate error there [rad/s]": mean("yaw_rate_error", ".3f"),
+        "and tracked": mean("tracked_to", "g"),
+    }
     full = LimitOptions()
     quick = LimitOptions(("trot",), trials=1, scouts=1, seconds=2.5, grid=1, axes=("vx", "yaw"))
     code = (*ExpertStudy.code, "experiments.searches")
@@ -87,28 +93,15 @@ class Limits(ExpertStudy):
         means = {"velocity_error": velocity, "yaw_rate_error": yaw_rate}
         return {"survived_to": level, "tracked_to": tracked, **means, "at_cap": at_cap}
 
-    def table(self, results: Results) -> str:
-        columns = {
-            "survived": lambda members: (
-                mean("survived_to", "g")(members) + " (end of the search)" * members[0]["at_cap"]
-            ),
-            "velocity error there [m/s]": mean("velocity_error", ".3f"),
-            "yaw rate error there [rad/s]": mean("yaw_rate_error", ".3f"),
-            "and tracked": mean("tracked_to", "g"),
-        }
-        return table(group(results.records, ["task", "condition"]), ["gait", "axis"], columns)
-
     def figure(self, results: Results) -> Figure:
         titles = {"vx": "forward [m/s]", "-vx": "backward [m/s]", "vy": "sideways [m/s]", "yaw": "yaw rate [rad/s]"}
-        series = {"survived": "survived_to", "and tracked": "tracked_to"}
-        return plots.dots(
-            {
-                titles[axis]: {
-                    name: {record["task"]: record[key] for record in members} for name, key in series.items()
-                }
-                for axis, members in group(results.records, "condition").items()
-            }
-        )
+        per_axis = group(results.records, "condition").items()
+        panels: dict[str, Any] = {titles[axis]: {"survived": {}, "and tracked": {}} for axis, _ in per_axis}
+        for axis, members in per_axis:
+            for record in members:
+                panels[titles[axis]]["survived"][record["task"]] = record["survived_to"]
+                panels[titles[axis]]["and tracked"][record["task"]] = record["tracked_to"]
+        return plots.dots(panels)
 
 
 def episodes(lab: Lab, task: str, axis: str, level: float, trials: int, seconds: float, seed: int) -> Errors | None:
@@ -149,25 +142,18 @@ class Pushes(ExpertStudy):
     title = "Pushes"
     note = "Largest change of the base's velocity that is survived at every phase of the cycle, walking at 0.3 m/s."
     caption = "Largest push survived at every phase of the cycle"
+    rows = {"task": "gait"}
+    columns = {f"{name} [m/s]": mean("largest", ".1f", condition=name) for name in DIRECTIONS}
     full = PushOptions()
     quick = PushOptions(("trot",), phases=1, grid=1, after_s=0.5, directions=("left", "forward"))
     code = (*ExpertStudy.code, "experiments.pushing", "experiments.searches")
 
     def measure_in(self, lab: Lab, task: str, seed: int) -> list[dict[str, Any]]:
-        sizes = {
-            direction: largest_push(lab, task, direction, self.options, seed) for direction in self.options.directions
-        }
-        return [{"condition": direction, "largest": largest} for direction, largest in sizes.items()]
-
-    def table(self, results: Results) -> str:
-        columns = {f"{name} [m/s]": mean("largest", ".1f", condition=name) for name in DIRECTIONS}
-        return table(group(results.records, "task"), ["gait"], columns)
+        options = self.options
+        return [{"condition": to, "largest": largest_push(lab, task, to, options, seed)} for to in options.directions]
 
     def figure(self, results: Results) -> Figure:
-        directions = group(results.records, "condition").items()
-        largest = {
-            direction: {record["task"]: record["largest"] for record in members} for direction, members in directions
-        }
+        largest = plots.panel(results.records, "condition", "task", lambda members: members[0]["largest"])
         return plots.dots({"largest push survived [m/s]": largest})
 
 
@@ -177,7 +163,7 @@ def largest_push(lab: Lab, task: str, direction: str, options: PushOptions, seed
     def passes(size: float) -> bool:
         return all(survives(lab, task, direction, size, k, options, seed) for k in range(options.phases))
 
-    return climb_from(options.first, options.step, options.grid, passes)
+    return climb(options.first, options.step, options.grid, passes)
 
 
 def survives(lab: Lab, task: str, direction: str, size: float, k: int, options: PushOptions, seed: int) -> bool:

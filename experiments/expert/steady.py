@@ -12,9 +12,8 @@ from experiments import plots
 from experiments.expert.lab import ExpertOptions, ExpertStudy, Lab, generator
 from experiments.pushing import CRUISE
 from experiments.results import Record, Results
-from experiments.stats import group
 from experiments.study import option
-from experiments.tables import mean, table
+from experiments.tables import first, mean
 from go1_mtl_gym import TASKS, Gait, robot
 from go1_mtl_gym.actuation import PHYSICS_HZ
 from go1_mtl_gym.gaits import next_phase
@@ -32,30 +31,27 @@ class SteadyOptions(ExpertOptions):
     cycles: int = option(2, "of the gait whose contacts are kept for the picture")
 
 
-COLUMNS = {
-    "command": lambda members: " ".join(f"{value:.2f}" for value in members[0]["command"]),
-    "contact as planned": mean("contact_agreement", ".3f"),
-    "touchdown lag [s]": mean("touchdown_lag_s", ".3f"),
-    "flight": mean("flight_fraction", ".3f"),
-    "planned": mean("planned_flight_fraction", ".3f"),
-    "torque at limit": mean("saturated_fraction", ".4f"),
-    "cost of transport": mean("cost_of_transport", ".2f"),
-    "height [m]": mean("height", ".3f"),
-    "RMS velocity error [m/s]": mean("rms_velocity_error", ".3f"),
-    "QP iterations": mean("qp_iterations", ".0f"),
-    "roll from, to [deg]": lambda members: " ".join(f"{value:.1f}" for value in members[0].get("roll_deg", ())) or "-",
-    "pitch from, to [deg]": lambda members: (
-        " ".join(f"{value:.1f}" for value in members[0].get("pitch_deg", ())) or "-"
-    ),
-}
-
-
 class Steady(ExpertStudy):
     """Steady walking at every millisecond: contacts against the plan, torques, energy, posture, tracking."""
 
     name = "expert_steady"
     title = "Steady walking"
     caption = "Feet on the ground over two cycles, planned and measured"
+    rows = {"task": "gait", "condition": "walk"}
+    columns = {
+        "command": first("command", ".2f"),
+        "contact as planned": mean("contact_agreement", ".3f"),
+        "touchdown lag [s]": mean("touchdown_lag_s", ".3f"),
+        "flight": mean("flight_fraction", ".3f"),
+        "planned": mean("planned_flight_fraction", ".3f"),
+        "torque at limit": mean("saturated_fraction", ".4f"),
+        "cost of transport": mean("cost_of_transport", ".2f"),
+        "height [m]": mean("height", ".3f"),
+        "RMS velocity error [m/s]": mean("rms_velocity_error", ".3f"),
+        "QP iterations": mean("qp_iterations", ".0f"),
+        "roll from, to [deg]": first("roll_deg", ".1f"),
+        "pitch from, to [deg]": first("pitch_deg", ".1f"),
+    }
     full = SteadyOptions()
     quick = SteadyOptions(("trot",), seconds=3.5)
 
@@ -66,22 +62,14 @@ class Steady(ExpertStudy):
             {"condition": "drawn", **_rollout(lab, task, drawn, self.options, seed)},
         ]
 
-    def table(self, results: Results) -> str:
-        return table(group(results.records, ["task", "condition"]), ["gait", "walk"], COLUMNS)
-
     def figure(self, results: Results) -> Figure:
         known = [record for record in results.records if "schedule" in record]
-        columns = 2 if len(known) > 1 else 1
-        rows = max(1, -(-len(known) // columns))
-        figure = plots.new_figure(4.4 * columns + 0.3, 1.55 * rows + 0.6)
-        axes = figure.subplots(rows, columns, squeeze=False).ravel()
-        for ax, record in zip(axes, known):
+        figure, axes = plots.grid(len(known), 2, (4.4, 1.55), (0.3, 0.6))
+        for ax, record in zip(axes.flat, known):
             _contacts(ax, record)
-        for ax in axes[len(known) :]:
-            ax.set_axis_off()
-        for ax in axes[max(0, len(known) - columns) : len(known)]:
+        for ax in axes.flat[max(0, len(known) - axes.shape[1]) : len(known)]:
             ax.set_xlabel("gait clock [cycles]", fontsize=9)
-        plots.legend(figure, axes[:1])
+        plots.legend(figure, axes.flat[:1])
         return figure
 
 
@@ -129,17 +117,18 @@ class Recorder:
         for i in range(physics_steps):
             self._step(target, 1)
             state = self.lab.env.state
-            self._note("phase", next_phase(begun.gait, begun.phase, begun.command, (i + 1) / PHYSICS_HZ))
-            self._note("contacts", state.contacts)
-            self._note("torque", self._simulation.torque)
-            self._note("joint_velocity", state.v)
-            self._note("height", state.position_w[2])
-            self._note("rpy", state.rpy)
-            self._note("velocity", state.base_velocity)
-            self._note("wanted", state.command)
-
-    def _note(self, name: str, value: Any) -> None:
-        self.rows.setdefault(name, []).append(np.array(value))
+            seen = {
+                "phase": next_phase(begun.gait, begun.phase, begun.command, (i + 1) / PHYSICS_HZ),
+                "contacts": state.contacts,
+                "torque": self._simulation.torque,
+                "joint_velocity": state.v,
+                "height": state.position_w[2],
+                "rpy": state.rpy,
+                "velocity": state.base_velocity,
+                "wanted": state.command,
+            }
+            for name, value in seen.items():
+                self.rows.setdefault(name, []).append(np.array(value))
 
     def series(self, skip_s: float) -> dict[str, np.ndarray]:
         """Name -> array with one row per millisecond, without the first seconds."""
@@ -150,15 +139,15 @@ def _rollout(
     lab: Lab, task: str, command: np.ndarray, options: SteadyOptions, seed: int, schedule: bool = False
 ) -> dict[str, Any]:
     lab.begin(task, command, "steady", seed)
-    calls, iterations = lab.settle().calls, lab.ledger.iterations
+    before = dict(lab.settle())
     with Recorder(lab) as recorder:
         survived = lab.walk(options.seconds)
-    ledger, gait = lab.settle(), TASKS[task].gait
+    made, gait = {name: count - before[name] for name, count in lab.settle().items()}, TASKS[task].gait
     series = recorder.series(options.skip_s)
     metrics = {
         "command": command,
         "survived": survived,
-        "qp_iterations": (ledger.iterations - iterations) / max(1, ledger.calls - calls),
+        "qp_iterations": made["iterations"] / max(1, made["calls"]),
     }
     if len(series["phase"]) < gait.period * PHYSICS_HZ:
         return metrics

@@ -13,10 +13,9 @@ from experiments.agents import Agent
 from experiments.expert.lab import ExpertOptions, ExpertStudy, Lab
 from experiments.expert.limits import PushOptions, largest_push
 from experiments.pushing import CRUISE
-from experiments.results import Results
-from experiments.stats import group
+from experiments.results import Results, group
 from experiments.study import option
-from experiments.tables import markdown, mean, share, table
+from experiments.tables import markdown, mean, share
 from experts import NMPCConfig, NMPCExpert
 from experts.nmpc import WHOLE_BODY
 from go1_mtl_gym.actuation import PHYSICS_HZ
@@ -74,7 +73,7 @@ class Timing(ExpertStudy):
         calls |= {name: other.counted.action for name, other in labs.items()}
         times = {name: quantiles(seconds) for name, seconds in interleaved(calls, states).items()}
         for other in labs.values():
-            lab.ledger.add(other.settle())
+            lab.ledger.update(other.settle())
         return [
             *({"condition": name, **times[name]} for name in (UPDATE, ACTION)),
             *({"agent": name, "condition": COMPARED_ACTION, **times[name]} for name in labs),
@@ -139,7 +138,7 @@ def interleaved(calls: dict[str, Callable[[RobotState], Any]], states: Sequence[
     return times
 
 
-def quantiles(seconds: np.ndarray) -> dict[str, float]:
+def quantiles(seconds: Sequence[float] | np.ndarray) -> dict[str, float]:
     """Median and 99th percentile in milliseconds."""
     return {"median_ms": float(1e3 * np.median(seconds)), "p99_ms": float(1e3 * np.quantile(seconds, 0.99))}
 
@@ -161,10 +160,6 @@ def real_time(lab: Lab, task: str, rate: int, options: TimingOptions, seed: int)
     simulation, steps = standing.env.simulation, round(options.block_s * rate)
     home = standing.env.action_map.from_radians(simulation.q)
 
-    def expert() -> None:
-        for _ in walking.drive(options.block_s):
-            pass
-
     def environment() -> None:
         for _ in range(steps):
             standing.env.step(home)
@@ -173,10 +168,10 @@ def real_time(lab: Lab, task: str, rate: int, options: TimingOptions, seed: int)
         for _ in range(steps):
             mujoco.mj_step(simulation.model, simulation.data, nstep=PHYSICS_HZ // rate)
 
-    calls = {"expert": expert, "environment": environment, "physics": physics}
+    calls = {"expert": partial(walking.walk, options.block_s), "environment": environment, "physics": physics}
     blocks = [{name: elapsed(call) for name, call in calls.items()} for _ in range(options.blocks)]
     factors = {name: float(options.block_s / np.median([block[name] for block in blocks])) for name in calls}
-    lab.ledger.add(walking.settle())
+    lab.ledger.update(walking.settle())
     return {"control_hz": rate} | factors | {"expert_to_physics": factors["expert"] / factors["physics"]}
 
 
@@ -203,6 +198,12 @@ class Settings(ExpertStudy):
 
     name = "expert_settings"
     title = "Settings compared"
+    rows = {"task": "gait", "agent": "settings"}
+    columns = {
+        "survived": share("survived"),
+        "velocity error [m/s]": mean("velocity_error", ".3f"),
+        "push to the side [m/s]": mean("lateral_push", ".1f"),
+    }
     full = SettingsOptions()
     quick = SettingsOptions(("trot",), 50, 1, 2.5, PushOptions(phases=1, grid=0, after_s=0.5, directions=("left",)))
     code = (*ExpertStudy.code, "experiments.pushing", "experiments.searches")
@@ -216,17 +217,7 @@ class Settings(ExpertStudy):
         pushes = [largest_push(lab, cell.task, direction, options.push, seed) for direction in options.push.directions]
         survived = sum(not episode.fallen for episode in walked.episodes)
         counts = {"trials": options.episodes, "survived": survived, "velocity_error": walked.velocity_error}
-        return counts | {"lateral_push": min(pushes)} | vars(lab.settle())
+        return counts | {"lateral_push": min(pushes)} | dict(lab.settle())
 
     def measure_in(self, lab: Lab, task: str, seed: int) -> list[dict[str, Any]]:
         raise NotImplementedError
-
-    def table(self, results: Results) -> str:
-        columns = {
-            "survived": share("survived"),
-            "velocity error [m/s]": mean("velocity_error", ".3f"),
-            "push to the side [m/s]": mean("lateral_push", ".1f"),
-        }
-        tasks = list(group(results.records, "task"))
-        records = sorted(results.records, key=lambda record: tasks.index(record["task"]))
-        return table(group(records, ["task", "agent"]), ["gait", "settings"], columns)

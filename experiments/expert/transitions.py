@@ -9,10 +9,9 @@ from matplotlib.figure import Figure
 from experiments import plots
 from experiments.expert.lab import ExpertOptions, ExpertStudy, Lab, generator, shared_range
 from experiments.results import Results
-from experiments.stats import group
 from experiments.student.transitions import transition_rates
 from experiments.study import option
-from experiments.tables import mean, share, table
+from experiments.tables import mean, share
 from go1_mtl_gym import TASKS
 
 
@@ -32,6 +31,8 @@ class Transitions(ExpertStudy):
     title = "Gait transitions"
     note = "Survived changes of gait, from this gait to all others."
     caption = "Survived gait transitions"
+    rows = {"task": "from"}
+    columns = {"survived": share("survived")}
     full = TransitionOptions()
     quick = TransitionOptions(("trot", "jump"), trials=1, after_s=1.0)
 
@@ -49,9 +50,6 @@ class Transitions(ExpertStudy):
                 survived += lab.walk(options.after_s)
             records.append({"condition": f"to {target}", "trials": trials, "survived": survived})
         return records
-
-    def table(self, results: Results) -> str:
-        return table(group(results.records, "task"), ["from"], {"survived": share("survived")})
 
     def figure(self, results: Results) -> Figure:
         return plots.transition_figure(transition_rates(results, "survived"), "survived gait transitions")
@@ -74,6 +72,13 @@ class LongWalk(ExpertStudy):
     name = "expert_long_walk"
     title = "The long walk"
     note = "Random commands, gait transitions and pushes at once."
+    rows = {"task": "begun in"}
+    columns = {
+        "control steps": mean("steps", ".0f"),
+        "gait transitions": mean("transitions", ".0f"),
+        "pushes": mean("pushes", ".0f"),
+        "falls": mean("falls", ".0f"),
+    }
     full = LongWalkOptions()
     quick = LongWalkOptions(("trot", "jump"), steps=100)
 
@@ -98,11 +103,4 @@ class LongWalk(ExpertStudy):
         return [{"steps": steps, "transitions": transitions, "pushes": pushes, "falls": falls}]
 
     def table(self, results: Results) -> str:
-        columns = {
-            "control steps": mean("steps", ".0f"),
-            "gait transitions": mean("transitions", ".0f"),
-            "pushes": mean("pushes", ".0f"),
-            "falls": mean("falls", ".0f"),
-        }
-        begun = group([record for record in results.records if "steps" in record], "task")
-        return table(begun, ["begun in"], columns)
+        return self.table_of([record for record in results.records if "steps" in record])

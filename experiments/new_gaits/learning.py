@@ -9,13 +9,12 @@ import numpy as np
 
 import trainers
 from experiments.study import option
-from experiments.training_runs import kept_policy, rows_of
+from experiments.training_runs import cloned, kept_policy, rows_of
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import number_in
 from trainers.data.environments import derive_seed
 from trainers.pipeline.config import NOISE_RAD, ROUND_NOISE_RAD, JobConfig
 from trainers.pipeline.demonstrations import held_out_jobs, shard_jobs
-from trainers.pipeline.new_policy import new_policy
 
 FROZEN, ASSISTED = "new head, frozen trunk", "new head, half by safe DAgger"
 TUNED, SCRATCH = "fine-tuned with rehearsal", "from scratch"
@@ -121,9 +120,7 @@ class GaitTraining:
         shown, asked = halves(self.seconds, job.shard_s) if self.method == ASSISTED else (self.seconds, 0.0)
         rows = rows_of(demonstrations(job, shown), self.folder)
         if self.method == SCRATCH:
-            policy = new_policy(job, job.env_kwargs)
-            trainers.train_bc(policy, rows, job.bc)
-            return policy
+            return cloned(job, rows)
         if asked:
             rows = self._with_round(self._headed(rows, job.bc), rows, asked, job)
         if self.method != TUNED:

@@ -1,6 +1,7 @@
 """Pace and gallop for a trained policy, by seconds of demonstrations and by the way of learning them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from matplotlib.figure import Figure
@@ -19,12 +20,11 @@ from experiments.new_gaits.learning import (
     held_out,
     rehearsal,
 )
-from experiments.results import Results
-from experiments.stats import Group, group
-from experiments.student.episodes import counts
+from experiments.results import Group, Results, group
+from experiments.student.episodes import counts, evaluate_gaits
 from experiments.study import ALL_GAITS, Cell, Metrics, Study
 from experiments.tables import count, markdown, number, percent
-from experiments.training_runs import collect, rows_of
+from experiments.training_runs import QUICK_JOB, collect, rows_of
 from go1_mtl_gym import TASKS
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import one_of
@@ -32,17 +32,6 @@ from trainers.pipeline.config import JobConfig
 
 NEW, OLD, BEFORE = "new gait", "old gait", "policy, before"
 COLORS = dict(zip(METHODS, (plots.BLUE, plots.PURPLE, plots.GREEN, plots.RED), strict=True))
-QUICK_JOB = JobConfig(
-    n_envs=1,
-    clean_s=3.0,
-    perturbed_s=3.0,
-    shard_s=2.0,
-    held_out_s=2.0,
-    batch_size=256,
-    clone_steps=40,
-    episodes=1,
-    episode_s=2.5,
-)
 
 
 class NewGaits(Study):
@@ -57,7 +46,9 @@ class NewGaits(Study):
     )
     caption = "Survival and R2 of new gaits by seconds of demonstrations"
     full = NewGaitOptions()
-    quick = NewGaitOptions(("pace",), QUICK_JOB, (2.0, 4.0), (0,), rehearsal_s=2.0, old_episodes=1)
+    quick = NewGaitOptions(
+        ("pace",), JobConfig(n_envs=1, **QUICK_JOB), (2.0, 4.0), (0,), rehearsal_s=2.0, old_episodes=1
+    )
     code = (*Study.code, "experiments.new_gaits.learning", "experiments.training_runs")
     takes_policies = True
 
@@ -116,34 +107,33 @@ class NewGaits(Study):
         options, base = self.options, self.base.load()
         if agent.name == EXPERT:
             env_kwargs = options.job_of(base, (cell.task,), 0).env_kwargs
-            return self._walk(EXPERT, cell.task, options.job.episodes, seed, **env_kwargs)
+            return self._walk(EXPERT, (cell.task,), options.job.episodes, seed, **env_kwargs)
         if agent.name == BEFORE:
-            return self._old_gaits(base, base.tasks, OLD, seed)
+            walked = self._walk(base, base.tasks, options.old_episodes, seed)
+            return [episodes | {"condition": OLD} for episodes in walked]
         demonstrations_s = float(cell.condition.split()[0])
         training = GaitTraining(base, cell.task, agent.name, demonstrations_s, cell.seed, options, self.folder)
         policy = training.policy()
         rows = rows_of(held_out(base, cell.task, options), self.folder).with_tasks(policy.tasks)
         record = {"condition": NEW, "demonstrations_s": demonstrations_s}
-        record |= self._walk(policy, cell.task, options.job.episodes, seed)
+        record |= self._walk(policy, (cell.task,), options.job.episodes, seed)[0]
         record |= trainers.offline_metrics(policy, rows)[cell.task]
         if agent.name != SCRATCH:
             record |= changes(base, policy, rehearsal(base, options, self.folder))
         if agent.name != TUNED:
             return record
-        old = self._old_gaits(policy, base.tasks, f"{OLD}, after {cell.task}", seed)
-        return [record, *({"demonstrations_s": demonstrations_s} | episode for episode in old)]
+        about = {"condition": f"{OLD}, after {cell.task}", "demonstrations_s": demonstrations_s}
+        return [record, *(walked | about for walked in self._walk(policy, base.tasks, options.old_episodes, seed))]
 
-    def _walk(self, policy: Any, gait: str, episodes: int, seed: int, **env_kwargs: Any) -> dict[str, Any]:
-        """Closed loop under commands that change."""
-        job = self.options.job
-        result = trainers.evaluate(
-            policy, gait, episodes, job.episode_s, seed, command_interval=job.command_interval, **env_kwargs
-        )
-        return counts(result) | {"survival_s": result.survival_s, "step_rate": result.step_rate}
-
-    def _old_gaits(self, policy: Any, tasks: Sequence[str], condition: str, seed: int) -> list[dict[str, Any]]:
-        episodes = self.options.old_episodes
-        return [{"task": task, "condition": condition, **self._walk(policy, task, episodes, seed)} for task in tasks]
+    def _walk(
+        self, policy: Any, gaits: tuple[str, ...], episodes: int, seed: int, **env_kwargs: Any
+    ) -> list[dict[str, Any]]:
+        """A record per gait of episodes under commands that change."""
+        walked = evaluate_gaits(policy, replace(self.options.job, tasks=gaits, episodes=episodes), seed, **env_kwargs)
+        return [
+            {"task": gait, **counts(result), "survival_s": result.survival_s, "step_rate": result.step_rate}
+            for gait, result in walked.items()
+        ]
 
     def table(self, results: Results) -> str:
         rows, budgets = [], []
@@ -159,10 +149,10 @@ class NewGaits(Study):
                 members = Group(record for level in levels.values() for record in level)
                 error = number(last.mean("velocity_error"), ".3f")
                 all_survive = "-" if least is None else f"{least:g} s"
-                rows.append([gait, method, *cells, all_survive, error, old_cell(members, Group(after))])
+                rows.append([gait, method, *cells, all_survive, error, old_cell(members, after)])
         header = ["gait", "learned", *budgets, "all survive from", "velocity error [m/s]", "old gaits"]
         expert = [f"{count(Group([record]).rate())} of {record['task']}" for record in results.of(agent=EXPERT)]
-        before = count(Group(results.of(agent=BEFORE)).rate())
+        before = count(results.of(agent=BEFORE).rate())
         return "\n\n".join(
             [
                 markdown(header, rows, text_columns=2),

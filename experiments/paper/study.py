@@ -15,8 +15,8 @@ from experiments.paper.differences import differences
 from experiments.paper.networks import Network, account, held_out
 from experiments.paper.published import KINDS, METRICS, MULTI_HEAD, PER_GAIT, POOLED, PUBLISHED, TARGETS
 from experiments.paper.settings import NAMED, TRAIN, UNSEEN, PaperOptions, Table, shard_jobs
-from experiments.results import Record, Results
-from experiments.stats import Group, group
+from experiments.results import Group, Record, Results, group
+from experiments.stats import estimate
 from experiments.study import ALL_GAITS, Cell, Metrics, Study
 from experiments.tables import estimated, markdown, number
 from experiments.training_runs import collect
@@ -122,9 +122,8 @@ class PaperStudy(Study):
         curves = [record for record in results.of(condition=CURVE) if record["agent"] in colors]
         widths = sorted({record["width"] for record in curves}, reverse=True)
         per_gait = group(curves, "task")
-        figure = plots.new_figure(3.3 * max(1, len(per_gait)) + 0.4, 3.2)
-        axes = figure.subplots(1, max(1, len(per_gait)), squeeze=False, sharey=True)[0]
-        for ax, (gait, members) in zip(axes, per_gait.items()):
+        figure, axes = plots.grid(len(per_gait), len(per_gait), (3.3, 3.2), (0.4, 0.0), sharey=True)
+        for ax, (gait, members) in zip(axes.flat, per_gait.items()):
             for record in members:
                 style = styles[min(widths.index(record["width"]), len(styles) - 1)]
                 label = f"{KINDS[record['agent']]}, {record['width']} wide"
@@ -134,8 +133,8 @@ class PaperStudy(Study):
             ax.set_title(gait, fontsize=10)
             ax.set_xlabel("gradient steps", fontsize=9)
             ax.tick_params(labelsize=8)
-        axes[0].set_ylabel("held-out MSE [rad²]", fontsize=9)
-        plots.legend(figure, axes)
+        axes[0, 0].set_ylabel("held-out MSE [rad²]", fontsize=9)
+        plots.legend(figure, axes.flat)
         return figure
 
     def more_figures(self) -> dict[str, Figure]:
@@ -207,7 +206,7 @@ def score_table(name: str, results: Results, use: str, paper: bool) -> str:
             cells = [number(metrics.get(key), DIGITS[key]) for key in SHOWN]
             rows.append([gait, f"paper, {PAPERS_KINDS[kind]}", "-", "2560", "-", "-", *cells])
         for learner, members in scores(results, gait, use).items():
-            cells = [estimated(members.estimate(key), DIGITS[key]) for key in SHOWN]
+            cells = [estimated(estimate(members.values(key)), DIGITS[key]) for key in SHOWN]
             about = [learner.precision, str(learner.width), str(learner.steps), str(len(members))]
             rows.append([gait, KINDS[learner.kind], *about, *cells])
     header = ["gait", "learner", "trained in", "width", "steps", "seeds", *SHOWN.values()]
@@ -279,7 +278,7 @@ def summary(measured: Mapping[str, Results]) -> list[str]:
             metrics = scores(results, gait, uses(results)[0])
             for way in dict.fromkeys(learner[:3] for learner in metrics):
                 ranked = [metrics.get(Learner(*way, rank)) for rank in range(len(KINDS))]
-                ours = ["-" if members is None else estimated(members.estimate("r2"), ".4f") for members in ranked]
+                ours = [estimated(estimate(members.values("r2")), ".4f") if members else "-" for members in ranked]
                 rows.append([data.replace("_", " "), gait, *theirs, ", ".join(map(str, way)), *ours])
     theirs = [f"{PAPERS_KINDS[kind]}, paper" for kind in (MULTI_HEAD, POOLED)]
     header = ["data", "gait", *theirs, "width, steps, trained in", *(f"{kind}, here" for kind in KINDS.values())]

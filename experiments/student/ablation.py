@@ -5,13 +5,11 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-import trainers
 from experiments import plots
 from experiments.agents import Agent
-from experiments.results import Results, distinct
-from experiments.stats import Group, group
+from experiments.results import Group, Results, distinct, group
 from experiments.student.commanded import DRAWN
-from experiments.student.episodes import counts, other_gaits
+from experiments.student.episodes import drawn, other_gaits
 from experiments.student.transitions import TransitionOptions, transition
 from experiments.study import EVALUATION_CODE, Cell, Metrics, Study, option
 from experiments.tables import count, mean, settings, share, table
@@ -121,16 +119,9 @@ class Ablation(Study):
             return dict(agent.origin.held_out[cell.task])
         if cell.condition not in (DRAWN, CHANGED):
             return transition(agent, cell, options.transitions, seed)
-        result = trainers.evaluate(
-            agent.load(),
-            cell.task,
-            options.episodes if cell.condition == DRAWN else options.changed_episodes,
-            options.seconds,
-            seed,
-            command_interval=options.command_interval,
-            **(CHANGED_WORLD if cell.condition == CHANGED else {}),
-        )
-        return counts(result)
+        if cell.condition == CHANGED:
+            return drawn(agent.load(), cell.task, options.changed_episodes, options, seed, **CHANGED_WORLD)
+        return drawn(agent.load(), cell.task, options.episodes, options, seed)
 
     def more(self) -> dict[str, Any]:
         return {"training": {name: changed(self.options.job(name)) for name in self.options.variants}}
@@ -153,11 +144,13 @@ class Ablation(Study):
             "changed": "changed world",
             "r2": "one-step R2",
         }
-        aggregates = {name: aggregate_variant(variant) for name, variant in group(results.records, "agent").items()}
-        variants = {
-            label: {name: variant[key] for name, variant in aggregates.items()} for key, label in columns.items()
-        }
-        return plots.dots({label: {"variants": values} for label, values in variants.items()})
+        variants = {name: aggregate_variant(records) for name, records in group(results.records, "agent").items()}
+        return plots.dots(
+            {
+                label: {"variants": {name: metrics[key] for name, metrics in variants.items()}}
+                for key, label in columns.items()
+            }
+        )
 
 
 def aggregate_variant(records: Group) -> dict[str, Any]:

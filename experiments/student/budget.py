@@ -11,12 +11,12 @@ from matplotlib.figure import Figure
 import trainers
 from experiments import plots
 from experiments.agents import Agent
-from experiments.results import Results
-from experiments.stats import Group, drops, group
-from experiments.student.episodes import counts
+from experiments.results import Group, Results, group
+from experiments.stats import drops
+from experiments.student.episodes import counts, evaluate_gaits
 from experiments.study import ALL_GAITS, Cell, Metrics, Study, option
 from experiments.tables import markdown, number, percent
-from experiments.training_runs import collect, kept_policy, rows_of
+from experiments.training_runs import QUICK_JOB, cloned, collect, kept_policy, rows_of
 from go1_mtl_gym.errors import InvalidInputError
 from trainers.pipeline.config import NOISE_RAD, ROUND_NOISE_RAD, JobConfig
 from trainers.pipeline.demonstrations import shard_jobs
@@ -88,18 +88,6 @@ class BudgetOptions:
         return shard_jobs(job, seconds, int(perturbed), job.perturbation(self.noise_rad) if perturbed else None)
 
 
-QUICK_JOB = replace(
-    BudgetOptions().job,
-    tasks=("trot", "bound"),
-    width=64,
-    batch_size=256,
-    shard_s=2.0,
-    clone_steps=60,
-    episodes=1,
-    episode_s=2.5,
-)
-
-
 class Budget(Study):
     """DAgger against cloning with equally many labels: five ways to ask for them."""
 
@@ -113,7 +101,7 @@ class Budget(Study):
     )
     caption = "Survival, success and falls over labels, of five ways to ask for them"
     full = BudgetOptions()
-    quick = BudgetOptions(QUICK_JOB, budgets_s=(2.0, 4.0), seeds=(0,))
+    quick = BudgetOptions(replace(BudgetOptions().job, **QUICK_JOB), budgets_s=(2.0, 4.0), seeds=(0,))
     code = (*Study.code, "experiments.training_runs")
 
     def agents(self) -> list[Agent]:
@@ -135,14 +123,9 @@ class Budget(Study):
             Counts per budget and gait, and of all gaits together; these with "falls" while collecting the labels, and
             the "learner_fraction" of the steps meanwhile that the learner drove.
         """
-        job, records = self.options.job, []
-        for labels_s, policy, collecting in Trainings(METHODS[agent.name], self.options, cell.seed, self.folder):
-            results = {
-                task: trainers.evaluate(
-                    policy, task, job.episodes, job.episode_s, seed, command_interval=job.command_interval
-                )
-                for task in job.tasks
-            }
+        records: list[dict[str, Any]] = []
+        for labels_s, policy, collecting in Trainings(agent.name, self.options, cell.seed, self.folder):
+            results = evaluate_gaits(policy, self.options.job, seed)
             together = counts(*results.values()) | collecting
             per_gait = [{"task": task, "labels_s": labels_s, **counts(result)} for task, result in results.items()]
             records += [{"labels_s": labels_s, **together}, *per_gait]
@@ -191,19 +174,19 @@ class Trainings:
     be trained anew when the next one is asked for.
 
     Attributes:
-        method: where the expert is asked.
+        name: of the method, one of `METHODS`.
         options: what all methods share.
         seed: of the training.
         folder: of demonstrations and policies.
     """
 
-    method: Method
+    name: str
     options: BudgetOptions
     seed: int
     folder: Path
 
     def __iter__(self) -> Iterator[tuple[float, Any, dict[str, float]]]:
-        if self.method.rounds:
+        if self._method.rounds:
             yield from self._rounds()
         else:
             yield from (self._cloned(labels_s) for labels_s in self.options.budgets_s)
@@ -213,32 +196,26 @@ class Trainings:
         return replace(self.options.job, seed=self.seed)
 
     @property
-    def _policies(self) -> Path:
-        name = next(name for name, method in METHODS.items() if method == self.method)
-        return self.folder / f"{name.replace(' ', '-')}-{self.seed}"
+    def _method(self) -> Method:
+        return METHODS[self.name]
 
-    def _new_policy(self) -> trainers.MultiHeadPolicy:
-        return new_policy(self._job, self._job.env_kwargs)
+    @property
+    def _policies(self) -> Path:
+        return self.folder / f"{self.name.replace(' ', '-')}-{self.seed}"
 
     def _cloned(self, labels_s: float) -> tuple[float, Any, dict[str, float]]:
         rows, falls = self._demonstrated(labels_s)
-
-        def train() -> Any:
-            policy = self._new_policy()
-            trainers.train_bc(policy, rows, self._job.bc)
-            return policy
-
-        policy = kept_policy(self._policies / f"cloned-{labels_s:g}.zip", train)
+        policy = kept_policy(self._policies / f"cloned-{labels_s:g}.zip", lambda: cloned(self._job, rows))
         return labels_s, policy, {"falls": falls, "learner_fraction": 0.0}
 
     def _rounds(self) -> Iterator[tuple[float, Any, dict[str, float]]]:
-        options, method, job = self.options, self.method, self._job
+        options, method, job = self.options, self._method, self._job
         labels_s, policy, collecting = self._cloned(options.budgets_s[0])
         yield labels_s, policy, collecting
         perturbation = job.perturbation(options.round_noise_rad) if method.perturbed else None
         dagger = trainers.DAggerConfig(labels_s, method.beta, takeover_rad=method.takeover_rad, seed=self.seed)
         base, falls = self._demonstrated(labels_s)
-        initial = self._new_policy().state_dict()
+        initial = new_policy(job, job.env_kwargs).state_dict()
         with closing(trainers.make_venv(job.tasks, 1, job.env_kwargs, perturbation)) as venv:
             trainer = trainers.DAggerTrainer(venv, policy, base, dagger, job.bc, scratch_dir=self._policies)
             by_learner = 0.0
@@ -253,6 +230,6 @@ class Trainings:
 
     def _demonstrated(self, labels_s: float) -> tuple[trainers.Demonstrations, int]:
         """Demonstrations, and the expert's falls in them: shards are shorter than an episode."""
-        jobs = self.options.demonstrations(self.seed, self.method.perturbed, labels_s)
+        jobs = self.options.demonstrations(self.seed, self._method.perturbed, labels_s)
         rows = rows_of(jobs, self.folder)
         return rows, int(rows.starts.sum()) - len(jobs)

@@ -5,12 +5,11 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-import trainers
 from experiments import plots
-from experiments.agents import EXPERT, PHASE_FREE, SHARED, STUDENT, Agent, Expert
-from experiments.results import Results, distinct
-from experiments.stats import Group, group
-from experiments.student.episodes import counts
+from experiments.agents import EXPERT, PHASE_FREE, SHARED, STUDENT, Agent
+from experiments.results import Group, Results, group
+from experiments.stats import Rate
+from experiments.student.episodes import drawn
 from experiments.student.phase import with_correction
 from experiments.study import EVALUATION_CODE, Cell, Metrics, Study, option
 from experiments.tables import count, judged, markdown, number
@@ -20,6 +19,8 @@ from trainers.pipeline.config import JobConfig
 DRAWN, CORNERS, CORRECTED = "drawn", "corners", "drawn, clock with correction"
 """Commands from the inside of the range, from its corners, and from its inside for a policy whose clock is its own and
 is corrected at every step by less than the whole estimate."""
+SEEDS = {"agent": STUDENT, "condition": DRAWN}
+"""Values of the records of the main job's policies, one per training seed."""
 TARGETS = {"success_rate": 0.95, "velocity_error": 0.05, "error_ratio": 2.0}
 """Smallest success rate, largest velocity error [m/s], and largest ratio of it to the expert's."""
 
@@ -64,7 +65,7 @@ class Commanded(Study):
             if run.config.phase_free_s:
                 phase_free.append(TrainedPolicy(PHASE_FREE, seed, path=run.phase_free, run=run))
         shared = {name: value for name, value in self.options.job.env_kwargs.items() if name in SHARED}
-        return [*policies, *phase_free, Expert(env_kwargs=shared)]
+        return [*policies, *phase_free, Agent(EXPERT, env_kwargs=shared)]
 
     def cells(self, agent: Agent) -> list[Cell]:
         conditions = (DRAWN, CORRECTED) if agent.name == PHASE_FREE else (DRAWN, CORNERS)
@@ -75,41 +76,22 @@ class Commanded(Study):
         if cell.condition == CORRECTED:
             policy = with_correction(policy, options.correction)
         episodes = options.corner_episodes if cell.condition == CORNERS else options.episodes
-        result = trainers.evaluate(
-            policy,
-            cell.task,
-            options.phase_free_episodes if agent.name == PHASE_FREE else episodes,
-            options.seconds,
-            seed,
-            command_interval=options.command_interval,
-            corners=cell.condition == CORNERS,
-            **agent.env_kwargs,
-        )
-        return counts(result)
+        if agent.name == PHASE_FREE:
+            episodes = options.phase_free_episodes
+        corners = cell.condition == CORNERS
+        return drawn(policy, cell.task, episodes, options, seed, corners=corners, **agent.env_kwargs)
 
     def more(self) -> dict[str, Any]:
         return {"targets": TARGETS, "training": changed(self.options.job)}
 
     def table(self, results: Results) -> str:
         rows = []
-        for gait in distinct(results.records, "task"):
-            seeds, expert = _seeds(results, gait), _members(results, gait, EXPERT, DRAWN)
-            tracked = [number(expert.mean("velocity_error"), ".3f"), "-"]
-            success = ["-"] * 5
-            if seeds:
-                together, ratio = seeds.rate(), _worst_ratio(seeds, expert)
-                low, high = together.interval
-                worst = min(of_seed.rate().value for of_seed in group(seeds, "seed").values())
-                errors = (seeds.mean("velocity_error"), seeds.largest("velocity_error"))
-                success = [
-                    count(together, TARGETS["success_rate"]),
-                    f"{low:.1%} ... {high:.1%}",
-                    judged(worst, TARGETS["success_rate"], "higher", ".0%"),
-                    *(judged(error, TARGETS["velocity_error"], "lower", ".3f") for error in errors),
-                ]
-                tracked[1] = judged(ratio, TARGETS["error_ratio"], "lower", ".2f")
+        for gait, members in group(results.records, "task").items():
+            seeds, expert = members.where(**SEEDS), members.where(agent=EXPERT, condition=DRAWN)
             others = [(STUDENT, CORNERS), (EXPERT, CORNERS), (PHASE_FREE, DRAWN), (PHASE_FREE, CORRECTED)]
-            counted = [count(_members(results, gait, agent, condition).rate()) for agent, condition in others]
+            success = _success(seeds) if seeds else ["-"] * 3
+            tracked = _tracked(seeds, expert.mean("velocity_error"))
+            counted = [count(members.where(agent=agent, condition=condition).rate()) for agent, condition in others]
             rows.append([gait, *success, *tracked, *counted])
         header = ["gait", "success", "95 % interval", "worst seed", "velocity error [m/s]", "worst seed's", "expert's"]
         return markdown([*header, "worst ratio", "corners", "expert's", "without a clock", "own clock"], rows)
@@ -117,27 +99,30 @@ class Commanded(Study):
     def figure(self, results: Results) -> Figure:
         success: dict[str, dict[str, Any]] = {"all seeds": {}, "worst seed": {}}
         errors: dict[str, dict[str, float | None]] = {"all seeds": {}, "worst seed": {}, EXPERT: {}}
-        for gait in distinct(results.records, "task"):
-            seeds, expert = _seeds(results, gait), _members(results, gait, EXPERT, DRAWN)
-            success["all seeds"][gait], errors["all seeds"][gait] = seeds.rate(), seeds.mean("velocity_error")
-            success["worst seed"][gait] = min(
-                (of_seed.rate() for of_seed in group(seeds, "seed").values()), default=None
-            )
+        for gait, members in group(results.records, "task").items():
+            seeds = members.where(**SEEDS)
+            success["all seeds"][gait], success["worst seed"][gait] = seeds.rate(), _worst(seeds)
+            errors["all seeds"][gait] = seeds.mean("velocity_error")
             errors["worst seed"][gait] = seeds.largest("velocity_error")
-            errors[EXPERT][gait] = expert.mean("velocity_error")
+            errors[EXPERT][gait] = members.where(agent=EXPERT, condition=DRAWN).mean("velocity_error")
         return plots.dots({"success": success, "velocity error [m/s]": errors})
 
 
-def _members(results: Results, gait: str, agent: str, condition: str) -> Group:
-    return Group(results.of(task=gait, agent=agent, condition=condition))
+def _worst(seeds: Group) -> Rate | None:
+    """Success of the training seed that has the smallest."""
+    return min((of_seed.rate() for of_seed in group(seeds, "seed").values()), key=lambda rate: rate.value, default=None)
 
 
-def _seeds(results: Results, gait: str) -> Group:
-    """A record per training seed."""
-    return _members(results, gait, STUDENT, DRAWN)
+def _success(seeds: Group) -> list[str]:
+    """Success of all training seeds together, its interval, and the worst seed's."""
+    low, high = seeds.rate().interval
+    worst = judged(_worst(seeds).value, TARGETS["success_rate"], "higher", ".0%")
+    return [count(seeds.rate(), TARGETS["success_rate"]), f"{low:.1%} ... {high:.1%}", worst]
 
 
-def _worst_ratio(seeds: Group, expert: Group) -> float | None:
-    """Largest ratio of a seed's velocity error to the expert's; None if there is none."""
-    largest, reference = seeds.largest("velocity_error"), expert.mean("velocity_error")
-    return largest / reference if largest is not None and reference else None
+def _tracked(seeds: Group, expert: float | None) -> list[str]:
+    """Mean velocity error, the worst training seed's, the expert's, and the ratio of the last two [m/s]."""
+    mean, worst = seeds.mean("velocity_error"), seeds.largest("velocity_error")
+    errors = [judged(error, TARGETS["velocity_error"], "lower", ".3f") for error in (mean, worst)]
+    ratio = worst / expert if worst is not None and expert else None
+    return [*errors, number(expert, ".3f"), judged(ratio, TARGETS["error_ratio"], "lower", ".2f")]

@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import trainers
+from trainers.pipeline.config import JobConfig
 
 
 def counts(*results: trainers.ClosedLoopResult) -> dict[str, Any]:
@@ -16,6 +17,27 @@ def counts(*results: trainers.ClosedLoopResult) -> dict[str, Any]:
         "succeeded": sum(episode.success for episode in episodes),
         "velocity_error": together.velocity_error,
     }
+
+
+def drawn(policy: Any, task: str, episodes: int, options: Any, seed: int, **world: Any) -> dict[str, Any]:
+    """Counts of episodes in one gait with commands that change.
+
+    Args:
+        policy: or "expert".
+        task: the gait.
+        episodes: how many.
+        options: of a study, with `seconds` and `command_interval` [s].
+        seed: of the episodes.
+        **world: see `trainers.evaluate`.
+    """
+    given = {"command_interval": options.command_interval} | world
+    return counts(trainers.evaluate(policy, task, episodes, options.seconds, seed, **given))
+
+
+def evaluate_gaits(policy: Any, job: JobConfig, seed: int, **world: Any) -> dict[str, trainers.ClosedLoopResult]:
+    """Gait -> episodes with commands that change, as many, as long and with as many commands as a job's."""
+    given = {"command_interval": job.command_interval} | world
+    return {task: trainers.evaluate(policy, task, job.episodes, job.episode_s, seed, **given) for task in job.tasks}
 
 
 def other_gaits(task: str, tasks: Iterable[str]) -> tuple[str, ...]:

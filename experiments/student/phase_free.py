@@ -10,9 +10,8 @@ from matplotlib.figure import Figure
 import trainers
 from experiments import plots
 from experiments.agents import Agent, shipped
-from experiments.results import Results, distinct
-from experiments.stats import Group, group
-from experiments.student.episodes import counts, other_gaits
+from experiments.results import Group, Results, distinct, group
+from experiments.student.episodes import counts, evaluate_gaits, other_gaits
 from experiments.student.phase import (
     Estimate,
     ask_for_phase,
@@ -26,7 +25,7 @@ from experiments.student.phase import (
 from experiments.student.transitions import TransitionOptions
 from experiments.study import ALL_GAITS, Cell, Metrics, Study, option
 from experiments.tables import mean, share, table
-from experiments.training_runs import collect, kept_policy, rows_of
+from experiments.training_runs import QUICK_JOB, collect, kept_policy, rows_of
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.sensing.observation import ObservationLayout, SensorNoise
 from go1_mtl_gym.validation import one_of
@@ -113,21 +112,6 @@ class PhaseFreeOptions:
         return shard_jobs(job, seconds, block, job.perturbation(self.noise_rad), job.randomization_kwargs)
 
 
-QUICK_JOB = replace(
-    PhaseFreeOptions().job,
-    tasks=("trot", "bound"),
-    clean_s=2.0,
-    perturbed_s=2.0,
-    held_out_s=2.0,
-    shard_s=2.0,
-    width=32,
-    batch_size=256,
-    clone_steps=30,
-    episodes=1,
-    episode_s=2.5,
-)
-
-
 class PhaseFree(Study):
     """Walking without a clock: raw proprioception, or a phase that is told from it."""
 
@@ -141,7 +125,9 @@ class PhaseFree(Study):
     )
     caption = "Success and error of the phase, of students without a clock"
     full = PhaseFreeOptions()
-    quick = PhaseFreeOptions(QUICK_JOB, 2.0, NOISE_RAD, TransitionOptions(1, 0.5, 2.5), 2.5, 1, (0.2,))
+    quick = PhaseFreeOptions(
+        replace(full.job, **QUICK_JOB), 2.0, NOISE_RAD, TransitionOptions(1, 0.5, 2.5), 2.5, 1, (0.2,)
+    )
     code = (*Study.code, "experiments.student.phase", "experiments.training_runs")
     takes_policies = True
 
@@ -199,15 +185,11 @@ class PhaseFree(Study):
         return table(group(results.records, "agent"), [""], columns)
 
     def figure(self, results: Results) -> Figure:
-        agents = group(results.of(task=ALL_GAITS), ["condition", "agent"])
-        success = {
-            condition: {agent: members.rate() for (name, agent), members in agents.items() if name == condition}
-            for condition in (WALKING, NOISY, TRANSITIONS)
-        }
-        errors = {
-            key: {agent: members.mean(key) for (name, agent), members in agents.items() if name == PHASE_ERROR}
-            for key in ("median", "p99")
-        }
+        together = results.of(task=ALL_GAITS)
+        walked = (record for record in together if record["condition"] != PHASE_ERROR)
+        success = plots.panel(walked, "condition", "agent", Group.rate)
+        per_agent = group(together.where(condition=PHASE_ERROR), "agent").items()
+        errors = {key: {agent: members.mean(key) for agent, members in per_agent} for key in ("median", "p99")}
         return plots.dots({"success": success, "phase error [cycles]": errors}, log=["phase error [cycles]"])
 
 
@@ -220,16 +202,8 @@ def _phase_error(members: Group) -> str:
 def walk(policy: Any, options: PhaseFreeOptions, episodes: int, seed: int) -> list[dict[str, Any]]:
     """Records of a policy in closed loop: unperturbed, with noisy sensors, and through changes of gait."""
     job, spans = options.job, {"before_s": options.transitions.before_s, "after_s": options.transitions.after_s}
-
-    def evaluate(number_: int, seconds: float, **world: Any) -> dict[str, trainers.ClosedLoopResult]:
-        interval = job.command_interval
-        return {
-            task: trainers.evaluate(policy, task, number_, seconds, seed, command_interval=interval, **world)
-            for task in job.tasks
-        }
-
-    steady = evaluate(episodes, job.episode_s)
-    noisy = evaluate(job.episodes, options.noisy_s, noise=SensorNoise())
+    steady = evaluate_gaits(policy, replace(job, episodes=episodes), seed)
+    noisy = evaluate_gaits(policy, replace(job, episode_s=options.noisy_s), seed, noise=SensorNoise())
     changed = [
         trainers.evaluate_transition(policy, first, second, options.transitions.trials, seed, **spans)
         for first in job.tasks

@@ -1,6 +1,6 @@
 """PPO that goes on from the trained policy: what it gains with care, and what it forgets without."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +11,12 @@ from stable_baselines3.common.vec_env import VecEnv
 
 import trainers
 from experiments import plots
-from experiments.agents import STUDENT, Agent, PolicyFile, shipped
-from experiments.results import Results, distinct
-from experiments.stats import Group, group
+from experiments.agents import STUDENT, Agent, shipped
+from experiments.results import Group, Results
 from experiments.student.episodes import counts
 from experiments.study import Cell, Metrics, Study, digest, sources
-from experiments.tables import count, markdown, number
+from experiments.tables import mean, share
+from experiments.training_runs import TrainedPolicy
 from trainers.algorithms.optimizer import torch_threads
 from trainers.data.environments import derive_seed
 from trainers.policies.pretrained import FOLDER
@@ -90,25 +90,6 @@ class PPORun:
         return model
 
 
-@dataclass(frozen=True)
-class Refined(PolicyFile):
-    """A policy that a PPO made.
-
-    Attributes:
-        run: that makes it.
-    """
-
-    run: PPORun = field(kw_only=True)
-
-    @property
-    def origin(self) -> PPORun:
-        """The run."""
-        return self.run
-
-    def prepare(self) -> float:
-        return self.run.make()
-
-
 class ReinforcementLearning(Study):
     """The policy of the package before and after PPO, with our way to begin and with PPO as it comes."""
 
@@ -121,6 +102,12 @@ class ReinforcementLearning(Study):
         "begins with the exploration that policies of version 0.1 had."
     )
     caption = "Success, velocity error and reward before and after PPO"
+    rows = {"task": "gait", "agent": ""}
+    columns = {
+        "success": share(),
+        "velocity error [m/s]": mean("velocity_error", ".3f"),
+        "reward per step": mean("reward", ".3f"),
+    }
     full = PPOOptions()
     quick = PPOOptions(steps=64, per_task=1, training_seeds=(0,), episodes=1, seconds=2.0)
 
@@ -130,7 +117,7 @@ class ReinforcementLearning(Study):
             for method in (CAREFUL, PLAIN)
             for seed in self.options.training_seeds
         ]
-        refined = [Refined(run.method, run.seed, path=run.policy, run=run) for run in runs]
+        refined = [TrainedPolicy(run.method, run.seed, path=run.policy, run=run) for run in runs]
         return [shipped(STUDENT, "clocked"), *refined]
 
     def cells(self, agent: Agent) -> list[Cell]:
@@ -142,29 +129,14 @@ class ReinforcementLearning(Study):
         result = trainers.evaluate(policy, cell.task, options.episodes, options.seconds, seed)
         return counts(result) | {"reward": mean_reward(policy, cell.task, options.episodes, options.seconds, seed)}
 
-    def table(self, results: Results) -> str:
-        """Per gait and method: success, velocity error and reward, all training seeds together."""
-        rows = []
-        for task in distinct(results.records, "task"):
-            for agent, members in group(results.of(task=task), "agent").items():
-                numbers = [number(members.mean("velocity_error"), ".3f"), number(members.mean("reward"), ".3f")]
-                rows.append([task, agent, count(members.rate()), *numbers])
-        return markdown(["gait", "", "success", "velocity error [m/s]", "reward per step"], rows, text_columns=2)
-
     def figure(self, results: Results) -> Figure:
-        """A dot per gait, method and metric."""
-        per = group(results.records, ["agent", "task"])
-        agents = distinct(results.records, "agent")
-
-        def column(metric: Any) -> dict[str, dict[str, Any]]:
-            return {name: {task: metric(members) for (a, task), members in per.items() if a == name} for name in agents}
-
+        metrics = {
+            "success": Group.rate,
+            "velocity error [m/s]": lambda members: members.mean("velocity_error"),
+            "reward per step": lambda members: members.mean("reward"),
+        }
         return plots.dots(
-            {
-                "success": column(Group.rate),
-                "velocity error [m/s]": column(lambda members: members.mean("velocity_error")),
-                "reward per step": column(lambda members: members.mean("reward")),
-            }
+            {name: plots.panel(results.records, "agent", "task", metric) for name, metric in metrics.items()}
         )
 
 

@@ -1,25 +1,35 @@
 """How hard a policy may be pushed: the largest push, per gait and direction, that nearly all trials survive."""
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from experiments import plots
-from experiments.agents import STUDENT, Agent, shipped, tasks_of, with_expert
+from experiments.agents import Agent, tasks_of, with_expert
 from experiments.pushing import CRUISE, DIRECTIONS, PAIRS, push_w, weaker
-from experiments.results import Results, distinct
+from experiments.results import Group, Results
 from experiments.searches import climb
-from experiments.stats import Group, group
 from experiments.study import EVALUATION_CODE, Cell, Metrics, Study, option
-from experiments.tables import Column, table
+from experiments.tables import Column
 from go1_mtl_gym import TASKS
 from trainers.data.environments import derive_seed, make_env
 from trainers.evaluation.rollout import Rollout
 
 STREAM = "kick"
 """Word that the seeds are drawn with; the published results were."""
+
+
+def _largest(direction: str) -> Column:
+    """The largest push in a direction, which may be more where the search ended."""
+
+    def cell(members: Group) -> str:
+        pushed = members.where(condition=direction)
+        return f"{'>= ' * pushed[0]['at_cap']}{pushed[0]['largest']:.1f}" if pushed else "-"
+
+    return cell
 
 
 @dataclass(frozen=True)
@@ -45,13 +55,15 @@ class Pushes(Study):
         "cycle, walking at 0.3 m/s."
     )
     caption = "Largest push survived, of student and expert"
+    rows = {"task": "gait", "agent": ""}
+    columns = {f"{name} [m/s]": _largest(name) for name in DIRECTIONS}
     full = PushOptions()
     quick = PushOptions(1, grid=1, before_s=0.5, after_s=0.5)
     code = (*EVALUATION_CODE, "experiments.pushing", "experiments.searches")
     takes_policies = True
 
     def agents(self) -> list[Agent]:
-        return with_expert(self.policies or [shipped(STUDENT, "clocked")])
+        return with_expert(self.policies)
 
     def cells(self, agent: Agent) -> list[Cell]:
         return [Cell(task, direction) for task in tasks_of(agent) for direction in self.options.directions]
@@ -76,34 +88,20 @@ class Pushes(Study):
             return survived >= options.fraction * options.trials - 1e-9
 
         try:
-            largest = climb([round(k * options.step, 6) for k in range(1, options.grid + 1)], passes)
+            largest = climb(options.step, options.step, options.grid - 1, passes)
         finally:
             env.close()
         return {"largest": largest, "at_cap": largest == tried[-1][0], "tried": tried}
 
-    def table(self, results: Results) -> str:
-        gaits = distinct(results.records, "task")
-        groups = group(sorted(results.records, key=lambda record: gaits.index(record["task"])), ["task", "agent"])
-        return table(groups, ["gait", ""], {f"{name} [m/s]": _largest(name) for name in DIRECTIONS})
-
     def figure(self, results: Results) -> Figure:
-        panels: dict[str, dict[str, dict[str, float | None]]] = {}
-        for (agent, gait), members in group(results.records, ["agent", "task"]).items():
-            largest = {record["condition"]: record["largest"] for record in members}
-            for name, pair in PAIRS.items():
-                panel = panels.setdefault(f"largest push survived, {name} [m/s]", {})
-                panel.setdefault(agent, {})[gait] = weaker(largest, pair)
-        return plots.dots(panels)
-
-
-def _largest(direction: str) -> Column:
-    """The largest push in a direction, which may be more where the search ended."""
-
-    def cell(members: Group) -> str:
-        pushed = members.where(condition=direction)
-        return f"{'>= ' * pushed[0]['at_cap']}{pushed[0]['largest']:.1f}" if pushed else "-"
-
-    return cell
+        return plots.dots(
+            {
+                f"largest push survived, {name} [m/s]": plots.panel(
+                    results.records, "agent", "task", partial(weaker, pair=pair)
+                )
+                for name, pair in PAIRS.items()
+            }
+        )
 
 
 def survives(env: Any, policy: Any, cell: Cell, size: float, options: PushOptions, trial: tuple[int, int]) -> bool:

@@ -7,12 +7,10 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-import trainers
 from experiments import plots
-from experiments.agents import EXPERT, STUDENT, Agent, Expert, shipped, tasks_of, with_expert
-from experiments.results import Record, Results, distinct
-from experiments.stats import group
-from experiments.student.episodes import counts
+from experiments.agents import EXPERT, Agent, tasks_of, with_expert
+from experiments.results import Record, Results, distinct, group
+from experiments.student.episodes import drawn
 from experiments.study import EVALUATION_CODE, Cell, Metrics, Study, option
 from experiments.tables import Column, share, table
 from go1_mtl_gym.sensing.observation import SensorNoise
@@ -61,21 +59,16 @@ class Robustness(Study):
     takes_policies = True
 
     def agents(self) -> list[Agent]:
-        return with_expert(self.policies or [shipped(STUDENT, "clocked")])
+        return with_expert(self.policies)
 
     def cells(self, agent: Agent) -> list[Cell]:
         return [Cell(task, quantity) for task in tasks_of(agent) for quantity in self.options.quantities]
 
     def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:
-        options, policy = self.options, agent.load()
-        levels = []
+        options, policy, levels = self.options, agent.load(), []
         for value in QUANTITIES[cell.condition][1][:: options.every]:
-            kwargs = {**agent.env_kwargs, **world(cell.condition, value, isinstance(agent, Expert))}
-            interval = options.command_interval
-            result = trainers.evaluate(
-                policy, cell.task, options.episodes, options.seconds, seed, command_interval=interval, **kwargs
-            )
-            levels.append({"value": value, **counts(result)})
+            kwargs = {**agent.env_kwargs, **world(cell.condition, value, agent.name == EXPERT)}
+            levels.append({"value": value, **drawn(policy, cell.task, options.episodes, options, seed, **kwargs)})
         return levels
 
     def table(self, results: Results) -> str:
@@ -89,16 +82,11 @@ class Robustness(Study):
 
     def figure(self, results: Results) -> Figure:
         shown = [name for name in QUANTITIES if name in distinct(results.records, "condition")]
-        columns = min(4, len(shown))
-        rows = -(-len(shown) // columns)
-        figure = plots.new_figure(2.9 * columns + 0.4, 2.15 * rows + 0.5)
-        axes = figure.subplots(rows, columns, sharey=True, squeeze=False)
+        figure, axes = plots.grid(len(shown), 4, (2.9, 2.15), (0.4, 0.5), sharey=True)
         for ax, quantity in zip(axes.flat, shown):
             _survival(ax, results.of(condition=quantity))
             ax.set_xlabel(QUANTITIES[quantity][0], fontsize=9)
             ax.tick_params(labelsize=8)
-        for ax in axes.flat[len(shown) :]:
-            ax.set_axis_off()
         for ax in axes[:, 0]:
             ax.set_ylabel("survival", fontsize=9)
         plots.legend(figure, axes.flat[:1])

@@ -6,9 +6,9 @@ from matplotlib.figure import Figure
 
 import trainers
 from experiments import plots
-from experiments.agents import STUDENT, Agent, shipped, tasks_of, with_expert
-from experiments.results import Results, distinct
-from experiments.stats import Rate, group
+from experiments.agents import Agent, tasks_of, with_expert
+from experiments.results import Results, distinct, group
+from experiments.stats import Rate
 from experiments.student.episodes import counts, other_gaits
 from experiments.study import EVALUATION_CODE, Cell, Metrics, Study, option
 from experiments.tables import share, table
@@ -39,7 +39,7 @@ class Transitions(Study):
     takes_policies = True
 
     def agents(self) -> list[Agent]:
-        return with_expert(self.policies or [shipped(STUDENT, "clocked")])
+        return with_expert(self.policies)
 
     def cells(self, agent: Agent) -> list[Cell]:
         tasks = tasks_of(agent)

@@ -17,7 +17,7 @@ from experiments.new_gaits import learning
 from experiments.new_gaits import study as new_gaits
 from experiments.paper import networks, settings
 from experiments.paper import study as paper
-from experiments.stats import Group
+from experiments.results import Group
 from experiments.study import Cell
 from experiments.training_runs import TrainedPolicy, TrainingRun, changed
 from go1_mtl_gym import TASKS, InvalidInputError
@@ -197,7 +197,7 @@ def test_a_verdict_needs_every_metric():
 TINY_GAITS = dataclasses.replace(
     new_gaits.NewGaits.quick,
     job=dataclasses.replace(
-        new_gaits.QUICK_JOB, width=16, shard_s=1.0, held_out_s=1.0, clone_steps=5, episode_s=0.5, batch_size=32
+        new_gaits.NewGaits.quick.job, width=16, shard_s=1.0, held_out_s=1.0, clone_steps=5, episode_s=0.5, batch_size=32
     ),
     demonstrations_s=(1.0, 2.0),
     rehearsal_s=1.0,

@@ -4,8 +4,9 @@ import math
 
 import pytest
 
-from experiments.searches import climb, climb_from, scouted
-from experiments.stats import Group, Rate, drops, estimate, group
+from experiments.results import Group, group
+from experiments.searches import climb, scouted
+from experiments.stats import Rate, drops, estimate
 from experiments.tables import count, estimated, judged, spans
 
 RECORDS = [
@@ -50,13 +51,13 @@ def test_a_drop_is_real_if_it_exceeds_the_interval_of_the_difference():
 @pytest.mark.parametrize(("falls_above", "largest"), [(0.7, 0.6), (0.2, 0.2), (0.1, 0.0), (9.0, 0.8)])
 def test_climbing_stops_below_the_first_failure(falls_above, largest):
     tried = []
-    assert climb([0.2, 0.4, 0.6, 0.8], lambda level: tried.append(level) or level <= falls_above) == largest
+    assert climb(0.2, 0.2, 3, lambda level: tried.append(level) or level <= falls_above) == largest
     assert len(tried) == min(4, round(largest / 0.2) + 1)
 
 
 @pytest.mark.parametrize(("falls_above", "largest"), [(1.23, 1.2), (0.6, 0.6), (0.35, 0.3), (0.0, 0.0), (99.0, 4.6)])
 def test_climbing_from_the_middle_comes_down_where_it_must(falls_above, largest):
-    assert climb_from(0.6, 0.1, 40, lambda level: level <= falls_above) == pytest.approx(largest)
+    assert climb(0.6, 0.1, 40, lambda level: level <= falls_above) == pytest.approx(largest)
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,8 @@ import pytest
 from experiments import study as frame
 from experiments.agents import Agent, PolicyFile
 from experiments.results import Results
-from experiments.study import Cell, Study, run
+from experiments.running import run
+from experiments.study import Cell, Study
 from go1_mtl_gym.errors import InvalidInputError
 
 
