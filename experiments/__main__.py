@@ -82,11 +82,12 @@ def run_command(name: str, arguments: list[str]) -> None:
     options = study_parser(name).parse_args(arguments)
     study = study_of(name, options)
     command = without_folders(shlex.join(["python", "-m", "experiments", "run", name, *arguments]))
+    path = cli.writable_file(options.out / f"{study.name}.json")
+    cli.writable_file(options.cache / study.name / "cell.json")
     try:
         results = run(study, options.seed, options.n_jobs, command, options.only)
     except KeyboardInterrupt as interrupt:
         raise KeyboardInterrupt("what is finished is kept, the same command goes on from there") from interrupt
-    path = options.out / f"{study.name}.json"
     if options.add and path.is_file():
         results = results.beside(Results.read(path), study.keys)
     results.write(path)

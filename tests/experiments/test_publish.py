@@ -157,3 +157,13 @@ def test_a_quick_run_writes_results_and_picture_and_goes_on(tmp_path, capsys):
     assert len(cells) == 6 and main([*arguments, *folders]) == 0
     assert (tmp_path / "student_transitions.json").read_text() == first
     assert cells == {path: path.stat().st_mtime_ns for path in cells}
+
+
+@pytest.mark.parametrize("option", ["--out", "--cache"])
+def test_a_place_that_cannot_be_written_is_refused_before_anything_is_measured(option, tmp_path, capsys):
+    (tmp_path / "file").write_text("taken")
+    folders = {"--out": str(tmp_path / "out"), "--cache": str(tmp_path / "cache"), option: str(tmp_path / "file")}
+    arguments = [word for pair in folders.items() for word in pair]
+    assert main(["run", "student_pushes", "--quick", *arguments]) == 2
+    assert "cannot be written" in capsys.readouterr().err
+    assert not [path for path in tmp_path.rglob("*.json")]

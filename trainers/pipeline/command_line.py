@@ -34,7 +34,7 @@ def job_parser() -> argparse.ArgumentParser:
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
     add = parser.add_argument
-    add("--preset", choices=tuple(PRESETS), default="default", help="minutes (smoke), half an hour (default), a day")
+    add("--preset", choices=[*PRESETS], default="default", help="smoke: minutes; default: half an hour; paper: a day")
     add("--out", help="folder of the results; an interrupted run goes on in the same one (default: runs/<date>)")
     add("--tasks", nargs="+", choices=tuple(TASKS), default=list(PAPER_TASKS), help="gaits, in head order")
     add("--rounds", type=int, default=None, help="DAgger rounds; the preset's if not given")
