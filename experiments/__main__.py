@@ -2,7 +2,6 @@
 
 import argparse
 import dataclasses
-import inspect
 import os
 import shlex
 import sys
@@ -11,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.agents import policy_files
-from experiments.catalog import STUDIES, study_class
+from experiments.catalog import STUDIES, study_class, summary_line
 from experiments.plots import save_figure
 from experiments.publish import publish_command
 from experiments.results import Results, without_folders
@@ -21,11 +20,6 @@ from go1_mtl_gym.validation import number_in
 from trainers.utils import cli
 
 OUT = CACHE / "results"
-
-
-def summary_line(study: type[Study]) -> str:
-    """What a study is about: the first line of its docstring."""
-    return (inspect.getdoc(study) or study.title).splitlines()[0]
 
 
 def study_parser(name: str) -> argparse.ArgumentParser:
@@ -82,8 +76,8 @@ def run_command(name: str, arguments: list[str]) -> None:
     options = study_parser(name).parse_args(arguments)
     study = study_of(name, options)
     command = without_folders(shlex.join(["python", "-m", "experiments", "run", name, *arguments]))
-    path = cli.writable_file(options.out / f"{study.name}.json")
-    cli.writable_file(options.cache / study.name / "cell.json")
+    path = cli.writable_folder(options.out) / f"{study.name}.json"
+    cli.writable_folder(options.cache)
     try:
         results = run(study, options.seed, options.n_jobs, command, options.only)
     except KeyboardInterrupt as interrupt:

@@ -1,5 +1,6 @@
 """Every study by name, imported when it is asked for."""
 
+import inspect
 from importlib import import_module
 from typing import Any
 
@@ -48,3 +49,8 @@ def study_class(name: str) -> type[Study]:
         InvalidInputError: if there is no study of that name.
     """
     return resolve(STUDIES[one_of(name, tuple(STUDIES), "study")])
+
+
+def summary_line(study: type[Study]) -> str:
+    """What a study is about: the first line of its docstring."""
+    return (inspect.getdoc(study) or study.title).splitlines()[0]

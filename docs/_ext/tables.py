@@ -6,9 +6,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields
 from pathlib import Path
 
-from experiments.catalog import STUDIES, study_class
+from experiments.catalog import STUDIES, study_class, summary_line
 from experiments.results import Results
-from experiments.study import summary_line
 from go1_mtl_gym import (
     TASKS,
     DomainRandomization,

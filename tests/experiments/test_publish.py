@@ -166,4 +166,4 @@ def test_a_place_that_cannot_be_written_is_refused_before_anything_is_measured(o
     arguments = [word for pair in folders.items() for word in pair]
     assert main(["run", "student_pushes", "--quick", *arguments]) == 2
     assert "cannot be written" in capsys.readouterr().err
-    assert not [path for path in tmp_path.rglob("*.json")]
+    assert not list(tmp_path.rglob("*.json"))

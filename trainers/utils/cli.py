@@ -83,7 +83,7 @@ def positive_int(text: str) -> int:
 
 
 def writable_file(path: str | Path) -> Path:
-    """Return the path of a file after a proof that it can be written; its folder is made.
+    """Return the path of a file after a proof that it can be written; nothing is left behind.
 
     Ask before long work, whose result would be lost otherwise.
 
@@ -93,13 +93,27 @@ def writable_file(path: str | Path) -> Path:
     file = Path(path)
     if file.is_dir():
         raise InvalidInputError(f"the path of a file was expected, got the folder {str(path)!r}")
+    _prove_writable(file.parent, file)
+    return file
+
+
+def writable_folder(path: str | Path) -> Path:
+    """Return the path of a folder after a proof that files can be made in it, or that it can be made itself.
+
+    Raises:
+        InvalidInputError: if neither is so.
+    """
+    _prove_writable(Path(path), Path(path))
+    return Path(path)
+
+
+def _prove_writable(folder: Path, asked_for: Path) -> None:
+    present = next(place for place in (folder, *folder.absolute().parents) if place.exists())
     try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=file.parent):
+        with tempfile.TemporaryDirectory(dir=present):
             pass
     except OSError as error:
-        raise InvalidInputError(f"{str(path)!r} cannot be written: {error.strerror}") from error
-    return file
+        raise InvalidInputError(f"{str(asked_for)!r} cannot be written: {error.strerror}") from error
 
 
 def interpreter() -> str:
