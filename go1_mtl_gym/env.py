@@ -299,9 +299,9 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
         self._running("push")
         self._simulation.push(finite_vector(delta_velocity_w, 3, "push (change of velocity)"))
 
-    def _running(self, what: str) -> Episode:
+    def _running(self, use: str) -> Episode:
         if self._episode is None:
-            raise ResetNeeded(f"call reset() before {what}")
+            raise ResetNeeded(f"call reset() before {use}")
         return self._episode
 
     # -- Copies ------------------------------------------------------------------------------------------------------

@@ -46,10 +46,10 @@ def _importable_name(expert: Callable[..., Any]) -> str | None:
     module, name = getattr(expert, "__module__", None), getattr(expert, "__qualname__", None)
     if not module or not name or module == "__main__":  # a script is called otherwise where it is imported
         return None
-    found: Any = sys.modules.get(module)
+    target: Any = sys.modules.get(module)
     for part in name.split("."):
-        found = getattr(found, part, None)
-    return f"{module}:{name}" if found is expert else None
+        target = getattr(target, part, None)
+    return f"{module}:{name}" if target is expert else None
 
 
 def load_expert(expert: str | Callable[..., Expert]) -> Callable[..., Expert]:
@@ -62,13 +62,13 @@ def load_expert(expert: str | Callable[..., Expert]) -> Callable[..., Expert]:
     if not isinstance(expert, str):
         return expert
     module, _, name = expert.partition(":")
-    found: Any = import_module(module)
+    target: Any = import_module(module)
     try:
         for part in name.split("."):
-            found = getattr(found, part)
+            target = getattr(target, part)
     except AttributeError as error:
         raise InvalidInputError(f"expert {expert!r}: the module {module} holds no {name}") from error
-    return found
+    return target
 
 
 def make_expert(expert: str | Callable[..., Expert], gains: PDGains, hold_s: float) -> Expert:

@@ -18,13 +18,13 @@ _NUMBER_KINDS = "iufO"
 """Kinds of numpy arrays that hold numbers, or things that may be numbers; not booleans, text or complex numbers."""
 
 
-def finite_vector(value: object, size: int, what: str) -> np.ndarray:
+def finite_vector(value: object, size: int, label: str) -> np.ndarray:
     """Return `value` as a new float64 vector of shape (size,).
 
     Args:
         value: anything numpy can read as numbers.
         size: required number of entries.
-        what: how the error message names the value, e.g. ``"command (vx, vy, yaw rate)"``.
+        label: how the error message names the value, e.g. ``"command (vx, vy, yaw rate)"``.
 
     Raises:
         InvalidInputError: if the value is not numeric, has another shape, or holds NaN or infinity.
@@ -33,17 +33,17 @@ def finite_vector(value: object, size: int, what: str) -> np.ndarray:
         raw = np.asarray(value)
         vector = raw.astype(np.float64) if raw.dtype.kind in _NUMBER_KINDS else None
     except Exception as error:  # foreign arrays raise what they like; a tensor with a gradient, a RuntimeError
-        raise InvalidInputError(f"{what} must be {size} numbers, got {value!r} ({error})") from error
+        raise InvalidInputError(f"{label} must be {size} numbers, got {value!r} ({error})") from error
     if vector is None:
-        raise InvalidInputError(f"{what} must be {size} numbers, got {value!r}")
+        raise InvalidInputError(f"{label} must be {size} numbers, got {value!r}")
     if vector.shape != (size,):
-        raise InvalidInputError(f"{what} must have shape ({size},), got shape {vector.shape}")
+        raise InvalidInputError(f"{label} must have shape ({size},), got shape {vector.shape}")
     if not np.isfinite(vector).all():
-        raise InvalidInputError(f"{what} must be finite, got {vector.tolist()}")
+        raise InvalidInputError(f"{label} must be finite, got {vector.tolist()}")
     return vector
 
 
-def interval_s(value: object, what: str) -> tuple[float, float] | None:
+def interval_s(value: object, label: str) -> tuple[float, float] | None:
     """Return `value` as a shortest and a longest time [s]; None stays None.
 
     Raises:
@@ -51,27 +51,27 @@ def interval_s(value: object, what: str) -> tuple[float, float] | None:
     """
     if value is None:
         return None
-    shortest, longest = finite_vector(value, 2, f"{what} [s]").tolist()
+    shortest, longest = finite_vector(value, 2, f"{label} [s]").tolist()
     if not 0 < shortest <= longest:
-        raise InvalidInputError(f"{what} must be 0 < shortest <= longest, got {(shortest, longest)}")
+        raise InvalidInputError(f"{label} must be 0 < shortest <= longest, got {(shortest, longest)}")
     return shortest, longest
 
 
-def number_in(value: object, low: float, high: float, what: str) -> float:
+def number_in(value: object, low: float, high: float, label: str) -> float:
     """Return `value` as a float in [low, high].
 
     Raises:
         InvalidInputError: if it is not a finite number in that range; True and False are no numbers.
     """
     if not isinstance(value, Real) or isinstance(value, bool):
-        raise InvalidInputError(f"{what} must be a number in [{low:g}, {high:g}], got {value!r}")
+        raise InvalidInputError(f"{label} must be a number in [{low:g}, {high:g}], got {value!r}")
     number = float(value)
     if not low <= number <= high:
-        raise InvalidInputError(f"{what} must lie in [{low:g}, {high:g}], got {number:g}")
+        raise InvalidInputError(f"{label} must lie in [{low:g}, {high:g}], got {number:g}")
     return number
 
 
-def integer_in(value: object, low: int, high: int, what: str) -> int:
+def integer_in(value: object, low: int, high: int, label: str) -> int:
     """Return `value` as an int in [low, high].
 
     Raises:
@@ -79,7 +79,7 @@ def integer_in(value: object, low: int, high: int, what: str) -> int:
     """
     whole = isinstance(value, Real) and not isinstance(value, bool) and float(value).is_integer()
     if not whole or not low <= value <= high:  # type: ignore[operator]
-        raise InvalidInputError(f"{what} must be an integer from {low} to {high}, got {value!r}")
+        raise InvalidInputError(f"{label} must be an integer from {low} to {high}, got {value!r}")
     return int(value)  # type: ignore[call-overload]
 
 
@@ -118,40 +118,40 @@ def check_numbers(
             object.__setattr__(parameters, name, number_in(value, low, high, f"{prefix}{name}{unit}{suffix}"))
 
 
-def one_of(value: object, allowed: Sequence[str], what: str) -> str:
+def one_of(value: object, allowed: Sequence[str], label: str) -> str:
     """Return `value` if it is one of `allowed`.
 
     Raises:
         InvalidInputError: otherwise.
     """
     if not isinstance(value, str) or value not in allowed:
-        raise InvalidInputError(f"{what} must be one of {', '.join(map(repr, allowed))}; got {value!r}")
+        raise InvalidInputError(f"{label} must be one of {', '.join(map(repr, allowed))}; got {value!r}")
     return str(value)
 
 
-def switch(value: object, kind: type[Parameters], what: str) -> Parameters | None:
+def switch(value: object, kind: type[Parameters], label: str) -> Parameters | None:
     """Return parameters that can be switched on: True gives the defaults of their kind; None and False give None.
 
     Args:
         value: what a user gave; a dictionary holds fields, as JSON has them.
         kind: a dataclass of parameters.
-        what: how messages name it.
+        label: how messages name it.
 
     Raises:
         InvalidInputError: if it is something else.
     """
     if value is None or value is False:
         return None
-    return kind() if value is True else parameters_of(value, kind, what, "None, True, False or ")
+    return kind() if value is True else parameters_of(value, kind, label, "None, True, False or ")
 
 
-def parameters_of(value: object, kind: type[Parameters], what: str, others: str = "") -> Parameters:
+def parameters_of(value: object, kind: type[Parameters], label: str, others: str = "") -> Parameters:
     """Return parameters of a kind, made from a dictionary of their fields if need be.
 
     Args:
         value: what a user gave.
         kind: a dataclass of parameters.
-        what: how messages name it.
+        label: how messages name it.
         others: what else messages say it may be.
 
     Raises:
@@ -159,9 +159,9 @@ def parameters_of(value: object, kind: type[Parameters], what: str, others: str 
     """
     if isinstance(value, Mapping):
         for name in value:
-            one_of(name, tuple(each.name for each in fields(kind)), f"field of {what}")  # type: ignore[arg-type]
+            one_of(name, tuple(each.name for each in fields(kind)), f"field of {label}")  # type: ignore[arg-type]
         return kind(**value)
     if not isinstance(value, kind):
         article = "an" if kind.__name__[0] in "AEIOU" else "a"
-        raise InvalidInputError(f"{what} must be {others}{article} {kind.__name__}, got {value!r}")
+        raise InvalidInputError(f"{label} must be {others}{article} {kind.__name__}, got {value!r}")
     return value

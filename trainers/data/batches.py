@@ -46,7 +46,7 @@ class TensorBatches:
     ) -> None:
         task = demonstrations.task
         rows = np.repeat(np.arange(len(task)), _checked_weights(weights, len(task)))
-        drawn = {k: own for k in range(len(demonstrations.tasks)) if len(own := rows[task[rows] == k])}
+        drawn = {k: members for k in range(len(demonstrations.tasks)) if len(members := rows[task[rows] == k])}
         if not 0 < batch_size <= len(demonstrations) or batch_size < len(drawn):
             raise InvalidInputError(
                 f"batch_size must lie between the number of tasks ({len(drawn)}) and the number of rows "
@@ -60,9 +60,9 @@ class TensorBatches:
         device = torch.device(device)
         self._obs = torch.from_numpy(demonstrations.obs).to(device)
         self._acts = torch.from_numpy(demonstrations.acts).to(device)
-        self._rows_of = [torch.from_numpy(own).to(device) for own in drawn.values()]
+        self._rows_of = [torch.from_numpy(members).to(device) for members in drawn.values()]
         self._shuffled = shuffled_by_numpy(seed) if device.type == "cpu" else shuffled_by_torch(seed, device)
-        self._queues = [own[:0] for own in self._rows_of]
+        self._queues = [members[:0] for members in self._rows_of]
 
     def __len__(self) -> int:
         """Batches per iteration."""

@@ -168,8 +168,8 @@ def save_gif(frames: np.ndarray, path: str | PathLike[str], fps: float = 25) -> 
     write_atomically(path, lambda file: images[0].save(file, format="GIF", optimize=False, **how))
 
 
-def _checked(frames: Any, what: str) -> np.ndarray:
+def _checked(frames: Any, label: str) -> np.ndarray:
     frames = np.asarray(frames)
     if frames.dtype != np.uint8 or frames.ndim != 4 or frames.shape[3] != 3 or not frames.size:
-        raise InvalidInputError(f"{what} must be uint8 of shape (n > 0, h, w, 3), got {frames.dtype} {frames.shape}")
+        raise InvalidInputError(f"{label} must be uint8 of shape (n > 0, h, w, 3), got {frames.dtype} {frames.shape}")
     return frames

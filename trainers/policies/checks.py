@@ -59,9 +59,12 @@ def check_arguments(
         raise InvalidInputError(f"n_tasks must be a positive integer, got {n_tasks!r}")
     if not isinstance(width, (int, np.integer)) or width < 1:
         raise InvalidInputError(f"width must be a positive integer, got {width!r}")
-    for space, smallest, what in ((observation_space, n_tasks, "observation_space"), (action_space, 0, "action_space")):
+    for space, smallest, label in (
+        (observation_space, n_tasks, "observation_space"),
+        (action_space, 0, "action_space"),
+    ):
         if not isinstance(space, spaces.Box) or len(space.shape) != 1 or space.shape[0] <= smallest:
-            raise InvalidInputError(f"{what} must be a flat Box of more than {smallest} entries, got {space}")
+            raise InvalidInputError(f"{label} must be a flat Box of more than {smallest} entries, got {space}")
     if normalization not in norm.MODES:
         raise InvalidInputError(f"normalization must be one of {', '.join(norm.MODES)}; got {normalization!r}")
     if not clip_sd > 0:

@@ -177,9 +177,9 @@ class MultiHeadPolicy(SavedPolicy, ForEnvironment, ActorCriticPolicy):
             InvalidInputError: if a shape is wrong or a value is not finite.
         """
         obs, acts = np.asarray(obs), np.asarray(acts)
-        for value, space, what in ((obs, self.observation_space, "obs"), (acts, self.action_space, "acts")):
+        for value, space, label in ((obs, self.observation_space, "obs"), (acts, self.action_space, "acts")):
             if value.ndim != 2 or value.shape[1:] != space.shape:
-                raise InvalidInputError(f"{what} must have shape (n, {space.shape[0]}), got {value.shape}")
+                raise InvalidInputError(f"{label} must have shape (n, {space.shape[0]}), got {value.shape}")
         self.obs_normalizer.set(*norm.fit(obs[:, : -self.n_tasks], self.normalization, binary))
         self.act_normalizer.set(*norm.fit(acts, self.normalization, np.zeros(acts.shape[1], dtype=bool)))
 
