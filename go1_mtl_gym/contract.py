@@ -167,6 +167,18 @@ class PolicyContract:
         return 1 + next((term.size for term in self.terms if term.name == "history"), 0) // FRAME_SIZE
 
     @property
+    def layout(self) -> ObservationLayout:
+        """The layout of a Go1's observation that has these terms.
+
+        Raises:
+            InvalidInputError: if the observation is something else's.
+        """
+        layout = ObservationLayout(self.tasks, self.channels, self.history)
+        if layout.size != self.observation_size:
+            raise InvalidInputError(f"the observations are not a Go1's: they hold {self.describe()}")
+        return layout
+
+    @property
     def env_kwargs(self) -> dict[str, Any]:
         """Keyword arguments of `go1_mtl_gym.Go1Env` that give an environment with this contract."""
         return {

@@ -9,7 +9,6 @@ from gymnasium import spaces
 
 import trainers
 from go1_mtl_gym.contract import PolicyContract
-from go1_mtl_gym.sensing.observation import ObservationLayout
 from trainers.policies.phase_estimator import phase_distance, unit
 
 PHASE_RAD = 0.1
@@ -97,7 +96,7 @@ def _seen(rows: trainers.Demonstrations, policy: Any) -> trainers.Demonstrations
 def phase_of(rows: trainers.Demonstrations) -> np.ndarray:
     """Sine and cosine of the clock at every row, shape (n, 2)."""
     contract = rows.contract
-    return rows.obs[:, ObservationLayout(contract.tasks, contract.channels, contract.history).slices["phase"]]
+    return rows.obs[:, contract.slices["phase"]]
 
 
 def phase_error(estimate: Estimate, rows: trainers.Demonstrations) -> dict[str, float]:

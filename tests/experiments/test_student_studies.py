@@ -302,7 +302,7 @@ def circle(turns):
 def rows_at(turns):
     """Rows of these phases, zero but for the first task's id."""
     contract = new_policy(TINY_JOB, TINY_JOB.env_kwargs).contract
-    layout = phase.ObservationLayout(contract.tasks, contract.channels, contract.history)
+    layout = contract.layout
     obs = np.zeros((len(turns), layout.size))
     obs[:, layout.slices["phase"]] = circle(turns)
     obs[:, layout.slices["task"].start] = 1.0

@@ -13,7 +13,7 @@ from tqdm.auto import tqdm
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
 from trainers.algorithms import losses
 from trainers.algorithms.optimizer import PRECISIONS, WeightAverage, adamw_one_cycle, matmul_precision
-from trainers.data.batches import TensorBatches
+from trainers.data.batches import TensorBatches, check_batch_size
 from trainers.data.demonstrations import Demonstrations
 from trainers.evaluation.metrics import offline_metrics
 from trainers.policies.multi_head import MultiHeadPolicy
@@ -275,7 +275,7 @@ def train_bc(
     config = config or BCConfig()
     dataset = dataset.fitted_to(policy.contract)
     validation = None if validation is None else validation.fitted_to(policy.contract)
-    TensorBatches(dataset, min(config.batch_size, len(dataset)), config.seed)  # refuses a size that is too small
+    check_batch_size(min(config.batch_size, len(dataset)), dataset)
     if fit_normalization:
         policy.fit_normalization(dataset.obs, dataset.acts)
     return BCTrainer(policy, config, logger).fit(dataset, validation, progress, on_batch_end)

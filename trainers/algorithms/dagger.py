@@ -264,7 +264,8 @@ class DAggerTrainer(imitation_dagger.DAggerTrainer):
         """Share each task's rows among its environments, by the task ids of their first observations."""
         task = flat_obs(self.venv.reset())[:, -len(self.base.tasks) :].argmax(axis=1)
         count = np.bincount(task, minlength=len(self.base.tasks))
-        left_out = [name for k, name in enumerate(self.base.tasks) if not count[k] and name in self.base.per_task()]
+        has_rows = np.bincount(self.base.task, minlength=len(self.base.tasks)) > 0
+        left_out = [name for name, count_k, known in zip(self.base.tasks, count, has_rows) if known and not count_k]
         if left_out:
             raise InvalidInputError(f"no environment begins in {', '.join(left_out)}, of which the base has rows")
         return np.ceil(seconds_per_task * self.base.control_hz / count[task]).astype(int)

@@ -64,8 +64,8 @@ def train_phase(
         InvalidInputError: if the rows do not fit, or there are none.
     """
     config = config or PhaseConfig()
-    seen, phase = inputs_and_phase(estimator, rows)
-    estimator.contract = rows.select(estimator.layout.channels, estimator.layout.history).contract
+    rows_seen, phase = inputs_and_phase(estimator, rows)
+    seen, estimator.contract = rows_seen.obs, rows_seen.contract
     device = estimator.normalizer.shift.device
     estimator.normalizer.set(*norm.fit(seen, "mean_std"))
     inputs, target = torch.as_tensor(seen, device=device), torch.as_tensor(phase, device=device)

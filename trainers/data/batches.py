@@ -47,11 +47,7 @@ class TensorBatches:
         task = demonstrations.task
         rows = np.repeat(np.arange(len(task)), _checked_weights(weights, len(task)))
         drawn = {k: members for k in range(len(demonstrations.tasks)) if len(members := rows[task[rows] == k])}
-        if not 0 < batch_size <= len(demonstrations) or batch_size < len(drawn):
-            raise InvalidInputError(
-                f"batch_size must lie between the number of tasks ({len(drawn)}) and the number of rows "
-                f"({len(demonstrations)}), got {batch_size}"
-            )
+        check_batch_size(batch_size, demonstrations)
         self.batch_size = int(batch_size)
         share, left = divmod(self.batch_size, len(drawn))
         self._shares = [share + (i < left) for i in range(len(drawn))]
@@ -78,6 +74,20 @@ class TensorBatches:
             self._queues[i] = torch.cat([self._queues[i], self._shuffled(self._rows_of[i])])
         drawn, self._queues[i] = self._queues[i][:count], self._queues[i][count:]
         return drawn
+
+
+def check_batch_size(batch_size: int, demonstrations: Demonstrations) -> None:
+    """Refuse batches that cannot be made of some rows.
+
+    Raises:
+        InvalidInputError: if there are fewer rows than one batch, or fewer rows in a batch than tasks.
+    """
+    rows, tasks = len(demonstrations), len(np.unique(demonstrations.task))
+    if not 0 < batch_size <= rows or batch_size < tasks:
+        raise InvalidInputError(
+            f"batch_size must lie between the number of tasks ({tasks}) and the number of rows ({rows}), "
+            f"got {batch_size}"
+        )
 
 
 def shuffled_by_numpy(seed: int) -> Callable[[torch.Tensor], torch.Tensor]:

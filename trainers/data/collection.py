@@ -158,7 +158,7 @@ def watch(
     env = make_env(task, perturbation, **{"episode_s": EPISODE_S, **job.env_kwargs})
     try:
         contract = base_env(env).contract
-        layout = ObservationLayout(contract.tasks, contract.channels, contract.history)
+        layout = contract.layout
         newest = ObservationLayout(contract.tasks, contract.channels)
         policy.contract.check(contract.with_terms(terms_of(newest)), "the policy", "the environment")
         columns = layout.columns(newest)

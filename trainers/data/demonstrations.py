@@ -126,10 +126,7 @@ class Demonstrations:
         Raises:
             InvalidInputError: if these rows do not have all of that.
         """
-        have = ObservationLayout(self.tasks, self.contract.channels, self.contract.history)
-        want = ObservationLayout(self.tasks, channels, history)
-        if have.size != self.contract.observation_size:
-            raise InvalidInputError(f"the observations are not a Go1's: they hold {self.contract.describe()}")
+        have, want = self.contract.layout, ObservationLayout(self.tasks, channels, history)
         contract = self.contract.with_terms(terms_of(want))
         return dataclasses.replace(self, obs=self.obs[:, have.columns(want)], contract=contract)
 

@@ -69,7 +69,7 @@ def phase_errors(estimator: PhaseEstimator, rows: Demonstrations) -> Mapping[str
         InvalidInputError: if the rows do not, or there are none.
     """
     seen, target = inputs_and_phase(estimator, rows)
-    error = phase_distance(estimator.estimate(seen), target)
+    error = phase_distance(estimator.estimate(seen.obs), target)
     task = rows.task
     return {
         name: {"median": float(np.median(error[task == k])), "p99": float(np.quantile(error[task == k], 0.99))}
@@ -78,8 +78,8 @@ def phase_errors(estimator: PhaseEstimator, rows: Demonstrations) -> Mapping[str
     }
 
 
-def inputs_and_phase(estimator: PhaseEstimator, rows: Demonstrations) -> tuple[np.ndarray, np.ndarray]:
-    """What an estimator sees of rows, shape (n, D), and (sine, cosine) of their phase, shape (n, 2).
+def inputs_and_phase(estimator: PhaseEstimator, rows: Demonstrations) -> tuple[Demonstrations, np.ndarray]:
+    """Rows as an estimator sees them, and (sine, cosine) of their phase, shape (n, 2).
 
     Raises:
         InvalidInputError: if the rows hold no phase, lack something that the estimator sees, or there are none.
@@ -92,7 +92,7 @@ def inputs_and_phase(estimator: PhaseEstimator, rows: Demonstrations) -> tuple[n
     seen = rows.select(layout.channels, layout.history)
     if estimator.contract is not None:
         estimator.contract.check(seen.contract, "the phase estimator", "the demonstrations")
-    return seen.obs, rows.obs[:, contract.slices["phase"]]
+    return seen, rows.obs[:, contract.slices["phase"]]
 
 
 def phase_distance(first: np.ndarray, second: np.ndarray) -> np.ndarray:

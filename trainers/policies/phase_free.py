@@ -180,10 +180,7 @@ def student_layout(student: MultiHeadPolicy) -> ObservationLayout:
     contract = student.contract
     if contract is None:
         raise InvalidInputError("a student with a contract was expected: it says where command and phase stand")
-    layout = ObservationLayout(contract.tasks, contract.channels, contract.history)
-    if layout.size != contract.observation_size:
-        raise InvalidInputError(f"the student must see what a Go1's environment shows, got {contract.describe()}")
-    return layout
+    return contract.layout
 
 
 def _memory(
