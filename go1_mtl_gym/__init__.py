@@ -22,11 +22,12 @@ from go1_mtl_gym.sensing.state_estimator import StateEstimatorConfig
 from go1_mtl_gym.sensing.state_noise import EstimatorNoise
 from go1_mtl_gym.sim.domain_randomization import DomainRandomization
 from go1_mtl_gym.sim.physics_params import PhysicsParams
-from go1_mtl_gym.tasks import PAPER_TASKS, TASKS, Task
+from go1_mtl_gym.tasks import BUILT_IN_TASKS, PAPER_TASKS, TASKS, Task
 from go1_mtl_gym.wrappers import PerturbationWrapper
 
 __all__ = [
     "GAITS",
+    "BUILT_IN_TASKS",
     "PAPER_TASKS",
     "TASKS",
     "DomainRandomization",

@@ -12,10 +12,10 @@ from go1_mtl_gym.sensing.state_estimator import StateEstimatorConfig
 from go1_mtl_gym.sensing.state_noise import EstimatorNoise
 from go1_mtl_gym.sim.domain_randomization import DomainRandomization
 from go1_mtl_gym.sim.physics_params import PhysicsParams
-from go1_mtl_gym.tasks import PAPER_TASKS, check_task_names
+from go1_mtl_gym.tasks import BUILT_IN_TASKS, check_task_names
 from go1_mtl_gym.validation import integer_in, number_in, one_of, parameters_of, switch
 
-DEFAULT_TASKS = PAPER_TASKS
+DEFAULT_TASKS = BUILT_IN_TASKS
 """What an environment knows unless told otherwise, besides its own task: the tasks of the policy in the package."""
 DEFAULT_CHANNELS = ("command", "phase", "last_action")
 """What an environment shows unless told otherwise: the channels that the policy in the package sees."""

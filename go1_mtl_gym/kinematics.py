@@ -41,3 +41,18 @@ def contact_points(q: np.ndarray, dq: np.ndarray, up_b: np.ndarray) -> tuple[np.
         + speeds[:, 2] * np.cross(across, point - calf_at)
     )
     return point, velocity
+
+
+def leg_kinematics(q: np.ndarray, dq: np.ndarray, angular_velocity_b: np.ndarray) -> np.ndarray:
+    """Where the feet are, and what each says of the trunk's velocity if it stands still: -(J dq + omega x p).
+
+    Args:
+        q: joint positions [rad], shape (12,).
+        dq: joint velocities [rad/s], shape (12,).
+        angular_velocity_b: omega, of the trunk in its frame [rad/s], shape (3,).
+
+    Returns:
+        Shape (24,), in the trunk frame: the centres of the feet p [m], 4 x 3, then the velocities [m/s], 4 x 3.
+    """
+    feet_b, velocity_b = contact_points(q, dq, np.zeros(3))
+    return np.concatenate([feet_b.ravel(), -(velocity_b + np.cross(angular_velocity_b, feet_b)).ravel()])

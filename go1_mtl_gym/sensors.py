@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from go1_mtl_gym.gaits import Gait
+from go1_mtl_gym.kinematics import leg_kinematics
 from go1_mtl_gym.sensing.observation import PROPRIOCEPTION, SensorNoise
 from go1_mtl_gym.sensing.state import RobotState
 from go1_mtl_gym.sim.simulation import Simulation
@@ -67,6 +68,7 @@ def measure(
     }
     if noise is not None:
         noise.apply(parts, rng)
+    parts["leg_kinematics"] = leg_kinematics(parts["q"], parts["dq"], parts["gyroscope"])
     return parts if simulation.stable else {name: np.nan_to_num(part) for name, part in parts.items()}
 
 

@@ -24,6 +24,8 @@ class Task:
         command_limit: largest |vx|, |vy|, |yaw rate| that the environment accepts; of the built-in tasks, the largest
             along each axis that the expert survived in 20 of 20 episodes (docs/results/expert.json, "limits").
         reward: weights of the reward terms.
+        push_limit: largest push forward, backward and sideways, a change of the trunk's velocity [m/s]; of the built-in
+            tasks, what the expert survives at every phase while it walks at 0.3 m/s (docs/results/expert_pushes.json).
 
     Raises:
         InvalidInputError: if the gait is none, the range exceeds the limit, or a figure is negative.
@@ -34,6 +36,7 @@ class Task:
     command_range: tuple[float, float, float]
     command_limit: tuple[float, float, float] = (2.0, 0.6, 2.0)
     reward: RewardWeights = field(default_factory=RewardWeights)
+    push_limit: tuple[float, float, float] = (0.5, 0.5, 0.5)
 
     def __post_init__(self) -> None:
         """Check everything, and make tuples of what came."""
@@ -46,6 +49,10 @@ class Task:
                 f"command_range of task {self.name!r} must lie between 0 and command_limit {limit.tolist()}, "
                 f"got {span.tolist()}"
             )
+        pushes = finite_vector(self.push_limit, 3, f"push_limit of task {self.name!r}")
+        if (pushes < 0).any():
+            raise InvalidInputError(f"push_limit of task {self.name!r} must not be negative, got {pushes.tolist()}")
+        object.__setattr__(self, "push_limit", tuple(pushes.tolist()))
         object.__setattr__(self, "command_range", tuple(span.tolist()))  # tasks can be compared
         object.__setattr__(self, "command_limit", tuple(limit.tolist()))
 
@@ -56,6 +63,19 @@ class Task:
     def draw_corner(self, rng: np.random.Generator) -> np.ndarray:
         """A uniform draw among the corners of the task's range: each of (vx, vy, yaw rate) at + or - its largest."""
         return rng.choice((-1.0, 1.0), 3) * np.array(self.command_range)
+
+    def largest_push(self, angle: float) -> float:
+        """The largest push in a direction [m/s]: of an ellipse in each quadrant, with `push_limit` as its axes.
+
+        Args:
+            angle: from forward to the left, in the heading frame [rad].
+        """
+        forward, backward, sideways = self.push_limit
+        x, y = np.cos(angle), np.sin(angle)
+        axes = np.array([forward if x >= 0 else backward, sideways])
+        if not axes.all():
+            return 0.0
+        return float(1.0 / np.hypot(x / axes[0], y / axes[1]))
 
     def check_command(self, command: object) -> np.ndarray:
         """Return a command as a vector (vx [m/s], vy [m/s], yaw rate [rad/s]).
@@ -76,12 +96,48 @@ class Task:
 _REGISTRY = {
     task.name: task
     for task in (
-        Task("trot", GAITS["trot"], command_range=(0.8, 0.3, 0.5), command_limit=(2.0, 1.0, 3.0)),
-        Task("bound", GAITS["bound"], command_range=(0.5, 0.3, 0.5), command_limit=(2.1, 1.0, 3.0)),
-        Task("jump", GAITS["jump"], command_range=(0.5, 0.3, 0.5), command_limit=(1.7, 0.7, 3.0)),
-        Task("walk", GAITS["walk"], command_range=(0.5, 0.3, 0.5), command_limit=(1.1, 0.9, 2.0)),
-        Task("pace", GAITS["pace"], command_range=(0.5, 0.2, 0.5), command_limit=(2.5, 1.0, 3.0)),
-        Task("gallop", GAITS["gallop"], command_range=(0.5, 0.2, 0.5), command_limit=(2.5, 1.0, 3.0)),
+        Task(
+            "trot",
+            GAITS["trot"],
+            command_range=(0.8, 0.3, 0.5),
+            command_limit=(2.0, 1.0, 3.0),
+            push_limit=(2.0, 2.0, 2.1),
+        ),
+        Task(
+            "bound",
+            GAITS["bound"],
+            command_range=(0.5, 0.3, 0.5),
+            command_limit=(2.1, 1.0, 3.0),
+            push_limit=(2.0, 0.9, 2.2),
+        ),
+        Task(
+            "jump",
+            GAITS["jump"],
+            command_range=(0.5, 0.3, 0.5),
+            command_limit=(1.7, 0.7, 3.0),
+            push_limit=(2.0, 1.9, 1.0),
+        ),
+        Task(
+            "walk",
+            GAITS["walk"],
+            command_range=(0.5, 0.3, 0.5),
+            command_limit=(1.1, 0.9, 2.0),
+            push_limit=(1.5, 1.9, 1.3),
+        ),
+        Task(
+            "pace",
+            GAITS["pace"],
+            command_range=(0.5, 0.2, 0.5),
+            command_limit=(2.5, 1.0, 3.0),
+            push_limit=(2.2, 2.5, 1.1),
+        ),
+        Task(
+            "gallop",
+            GAITS["gallop"],
+            command_range=(0.5, 0.2, 0.5),
+            command_limit=(2.5, 1.0, 3.0),
+            push_limit=(2.1, 0.9, 2.2),
+        ),
     )
 }
 TASKS = MappingProxyType(_REGISTRY)
@@ -89,8 +145,10 @@ TASKS = MappingProxyType(_REGISTRY)
 
 Their order is the order of a policy's heads and of the one-hot task id.
 """
+BUILT_IN_TASKS = tuple(_REGISTRY)
+"""The tasks that come with the package, in head order: what the main job teaches unless told otherwise."""
 PAPER_TASKS = ("trot", "bound", "jump", "walk")
-"""The gaits of arXiv 2505.08574, in head order: what the main job teaches unless told otherwise."""
+"""The gaits of arXiv 2505.08574, in head order."""
 _NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z][a-z0-9]*)*")
 
 

@@ -11,6 +11,7 @@
 | gravity       | 3    | -       | channel      | unit vector of gravity, trunk frame                                |
 | phase         | 2    | -       | channel      | sine and cosine of the gait clock                                  |
 | last_action   | 12   | -       | channel      | the action applied during the last step                            |
+| leg_kinematics | 24  | m, m/s | channel      | feet, 4 x 3, and what each says of the trunk's velocity, 4 x 3     |
 | history       | 34 (n - 1) | as above | history = n | the n - 1 proprioceptive frames before this one, newest first |
 | task          | K    | 0 or 1  | yes          | one-hot task id, in the order of the environment's `tasks`         |
 """
@@ -27,10 +28,17 @@ from go1_mtl_gym.validation import Limits, check_numbers, integer_in, one_of
 
 PROPRIOCEPTION = MappingProxyType({"accelerometer": 3, "gyroscope": 3, "q": 12, "dq": 12, "contacts": 4})
 """Sizes of the raw proprioceptive parts; together the 34 numbers of arXiv 2505.08574."""
-CHANNELS = MappingProxyType({"command": 3, "gravity": 3, "phase": 2, "last_action": 12})
+CHANNELS = MappingProxyType({"command": 3, "gravity": 3, "phase": 2, "last_action": 12, "leg_kinematics": 24})
 """Sizes of the parts that are there when asked for."""
 UNITS = MappingProxyType(
-    {"accelerometer": "m/s^2", "gyroscope": "rad/s", "q": "rad", "dq": "rad/s", "command": "m/s, m/s, rad/s"}
+    {
+        "accelerometer": "m/s^2",
+        "gyroscope": "rad/s",
+        "q": "rad",
+        "dq": "rad/s",
+        "command": "m/s, m/s, rad/s",
+        "leg_kinematics": "m, m/s",
+    }
 )
 """Units of the parts that have one."""
 FRAME_SIZE = sum(PROPRIOCEPTION.values())
@@ -44,6 +52,7 @@ _BOUND = {
     "gravity": np.ones(3),
     "phase": np.ones(2),
     "last_action": np.ones(12),
+    "leg_kinematics": np.repeat([1.0, 40.0], 12),
 }
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from go1_mtl_gym import PAPER_TASKS, TASKS, PerturbationWrapper, PolicyContract, Task
+from go1_mtl_gym import PAPER_TASKS, TASKS, PolicyContract, Task
 from go1_mtl_gym.actuation import ActionMap, PDGains
 from go1_mtl_gym.sensing.observation import FRAME_SIZE, ObservationLayout
 from trainers.data.environments import ExpertAccess, PerturbationConfig
@@ -137,5 +137,5 @@ def make_stub(task: str, perturbation: PerturbationConfig | None = None, **env_k
     """The stub's environment factory."""
     env = StubEnv(task, **env_kwargs)
     if perturbation is not None:
-        env = PerturbationWrapper(env, **vars(perturbation))
+        env = perturbation.wrap(env)
     return ExpertAccess(env)

@@ -15,6 +15,7 @@ from trainers.algorithms import losses
 from trainers.algorithms.optimizer import PRECISIONS, WeightAverage, adamw_one_cycle, matmul_precision
 from trainers.data.batches import TensorBatches, check_batch_size
 from trainers.data.demonstrations import Demonstrations
+from trainers.data.mirror import mirrored, with_mirrored
 from trainers.evaluation.metrics import offline_metrics
 from trainers.policies.multi_head import MultiHeadPolicy
 from trainers.utils.logging import make_logger
@@ -39,6 +40,7 @@ class BCConfig:
         ema_decay: if positive, the result is an exponential moving average of the weights with this decay per step.
         log_interval: steps between entries of log and history.
         seed: of the order of the rows.
+        mirror: learn from every row and from its image in a mirror (`trainers.mirrored`), where the gait has one.
         matmul_precision: of float32 matrix products while training: "highest", "high" or "medium", as
             `torch.set_float32_matmul_precision` has it. Faster where the processor has something faster to offer.
         autocast: whether the network computes in bfloat16, which is faster still; the weights stay float32.
@@ -57,6 +59,7 @@ class BCConfig:
     ema_decay: float = 0.0
     log_interval: int = 250
     seed: int = 0
+    mirror: bool = False
     matmul_precision: str = "highest"
     autocast: bool = False
 
@@ -159,6 +162,8 @@ class BCTrainer(imitation_bc.BC):
         config, policy = self.config, self.policy
         dataset = dataset.fitted_to(policy.contract)
         validation = None if validation is None else validation.fitted_to(policy.contract)
+        if config.mirror:
+            dataset, weights = with_mirrored(dataset, weights)
         batch_size = min(config.batch_size, len(dataset))
         self.batch_size = self.minibatch_size = batch_size
         seed = config.seed if seed is None else seed
@@ -277,5 +282,6 @@ def train_bc(
     validation = None if validation is None else validation.fitted_to(policy.contract)
     check_batch_size(min(config.batch_size, len(dataset)), dataset)
     if fit_normalization:
-        policy.fit_normalization(dataset.obs, dataset.acts)
+        seen = Demonstrations.concatenate([dataset, mirrored(dataset)]) if config.mirror else dataset
+        policy.fit_normalization(seen.obs, seen.acts)
     return BCTrainer(policy, config, logger).fit(dataset, validation, progress, on_batch_end)

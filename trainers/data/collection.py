@@ -72,6 +72,8 @@ class CollectJob:
             set_field("command", tuple(finite_vector(self.command, 3, "command (vx, vy, yaw rate)").tolist()))
         if not (self.perturbation is None or isinstance(self.perturbation, PerturbationConfig)):
             raise InvalidInputError(f"perturbation must be a PerturbationConfig or None, got {self.perturbation!r}")
+        if self.command is not None and self.perturbation is not None and self.perturbation.operator is not None:
+            raise InvalidInputError(f"an operator gives the commands; beside it came command={self.command!r}")
         set_field("env_kwargs", dict(self.env_kwargs))
         for name, value in self.env_kwargs.items():
             json_form(value, f"env_kwargs[{name!r}]")

@@ -17,6 +17,8 @@ from go1_mtl_gym.contract import PolicyContract
 from go1_mtl_gym.deprecation import renamed_arguments
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
 from go1_mtl_gym.validation import interval_s, number_in, one_of
+from trainers.data.operator import OperatorConfig
+from trainers.data.operator_wrapper import OperatorWrapper
 from trainers.utils.processes import keep_interrupts
 
 if TYPE_CHECKING:
@@ -76,6 +78,8 @@ class PerturbationConfig:
         command_interval: shortest and longest time between new commands [s], or None for one command per episode.
         corner_fraction: probability with which a new command is a corner of the task's range.
         task_interval: shortest and longest time between changes of task [s], or None for one task per episode.
+        operator: whose hands move the stick, change the gait and push now and then; takes the place of the three
+            settings above, while `push` goes on beside its own pushes. None draws commands and tasks at random.
 
     Raises:
         InvalidInputError: if a figure is negative, or an interval is not 0 < shortest <= longest.
@@ -87,13 +91,24 @@ class PerturbationConfig:
     command_interval: tuple[float, float] | None = (1.5, 4.0)
     corner_fraction: float = 0.0
     task_interval: tuple[float, float] | None = None
+    operator: OperatorConfig | None = None
 
     def __post_init__(self) -> None:
+        if not (self.operator is None or isinstance(self.operator, OperatorConfig)):
+            raise InvalidInputError(f"operator must be an OperatorConfig or None, got {self.operator!r}")
         if not (self.noise_rad >= 0 and self.push >= 0 and self.push_interval > 0):
             raise InvalidInputError(f"noise_rad and push must be >= 0 and push_interval > 0, got {self}")
         number_in(self.corner_fraction, 0.0, 1.0, "corner_fraction")
         for name in ("command_interval", "task_interval"):
             object.__setattr__(self, name, interval_s(getattr(self, name), name))
+
+    def wrap(self, env: gymnasium.Env) -> gymnasium.Env:
+        """An environment that is disturbed in this way."""
+        figures = {each.name: getattr(self, each.name) for each in dataclasses.fields(self) if each.name != "operator"}
+        if self.operator is None:
+            return go1_mtl_gym.PerturbationWrapper(env, **figures)
+        figures |= {"command_interval": None, "task_interval": None}
+        return OperatorWrapper(go1_mtl_gym.PerturbationWrapper(env, **figures), self.operator)
 
 
 class ExpertAccess(gymnasium.Wrapper):
@@ -136,7 +151,7 @@ def make_env(task: str | None, perturbation: PerturbationConfig | None = None, *
         one_of(task, tuple(go1_mtl_gym.TASKS), "task (go1_mtl_gym.register_task adds others)")
     env = gymnasium.make(go1_mtl_gym.env_id(task), disable_env_checker=True, **env_kwargs)
     if perturbation is not None:
-        env = go1_mtl_gym.PerturbationWrapper(env, **dataclasses.asdict(perturbation))
+        env = perturbation.wrap(env)
     return ExpertAccess(env, perturbation)
 
 

@@ -9,6 +9,8 @@ from go1_mtl_gym import TASKS
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import integer_in, one_of
 from trainers.data.environments import EnvFactory, base_env, derive_seed, make_env
+from trainers.data.operator import OperatorConfig
+from trainers.data.operator_wrapper import OperatorWrapper
 from trainers.evaluation.rollout import Rollout, checked_agent, opened, run_all
 from trainers.evaluation.scoring import ClosedLoopResult, EpisodeRecord, score
 from trainers.utils.validation import checked_jobs, positive, refuse_overridden
@@ -24,6 +26,7 @@ def evaluate(
     commands: Sequence[Sequence[float]] | None = None,
     command_interval: float | None = None,
     corners: bool = False,
+    operator: OperatorConfig | None = None,
     n_jobs: int = 1,
     progress: bool = False,
     make_env: EnvFactory = make_env,
@@ -46,6 +49,8 @@ def evaluate(
         command_interval: draw a new command every so many seconds; None keeps one per episode.
         corners: draw commands from the corners of the task's range, where every component is at its largest, instead
             of from its inside.
+        operator: whose hands drive (`trainers.OperatorConfig`), in place of the three arguments above; they begin in
+            the task, and change the gait and push if their configuration says so. None draws commands.
         n_jobs: processes.
         progress: show a bar.
         make_env: another environment factory.
@@ -62,6 +67,11 @@ def evaluate(
         raise InvalidInputError("commands must be None or hold at least one (vx, vy, yaw rate), got none")
     if commands is not None and corners:
         raise InvalidInputError(f"commands are given or drawn from corners, got corners=True and {commands}")
+    if operator is not None and not (commands is None and command_interval is None and not corners):
+        raise InvalidInputError(
+            "an operator gives the commands; beside it came "
+            f"commands={commands!r}, command_interval={command_interval!r}, corners={corners!r}"
+        )
     if command_interval is not None:
         command_interval = positive(command_interval, "command_interval")
     if commands is not None:
@@ -73,7 +83,7 @@ def evaluate(
     def call(i: int) -> tuple[Any, ...]:
         command = None if commands is None else tuple(commands[i % len(commands)])
         episode_seed = derive_seed("evaluate", task, seed, i)
-        return policy_or_expert, task, episode_seed, command, command_interval, corners, kwargs, make_env
+        return policy_or_expert, task, episode_seed, command, command_interval, corners, operator, kwargs, make_env
 
     records = run_all(_episode, map(call, range(episodes)), episodes, n_jobs, progress, f"evaluate {task}")
     return ClosedLoopResult(task, float(seconds), tuple(records))
@@ -86,6 +96,7 @@ def _episode(
     command: tuple[float, ...] | None,
     command_interval: float | None,
     corners: bool,
+    operator: OperatorConfig | None,
     env_kwargs: dict[str, Any],
     make_env: EnvFactory,
 ) -> EpisodeRecord:
@@ -96,6 +107,8 @@ def _episode(
         options["command"] = tuple(draw(rng).tolist()) if command is None else command
     with opened(make_env, task, env_kwargs) as env:
         base = base_env(env)
+        if operator is not None:
+            env = OperatorWrapper(env, operator)
         rollout = Rollout(env, policy_or_expert, seed, options)
         given = [rollout.command]
         steps = round(env_kwargs["episode_s"] * base.control_hz)
@@ -107,4 +120,5 @@ def _episode(
                 base.set_command(given[-1])
 
         series = rollout.walk(steps, redraw)
-        return score(series, rollout.fallen, seed, tuple(given), TASKS[task].gait, base.control_hz)
+        gait = TASKS[task].gait if operator is None else None
+        return score(series, rollout.fallen, seed, tuple(given), base.control_hz, gait)

@@ -97,12 +97,12 @@ def tracking_error(measured: np.ndarray, wanted: np.ndarray, window: int, skip: 
     return float(np.linalg.norm(mean[:, :2], axis=1).mean()), float(np.abs(mean[:, 2]).mean())
 
 
-def touchdowns(contacts: np.ndarray, min_air: int, skip: int) -> np.ndarray:
+def touchdowns(contacts: np.ndarray, min_air: int | np.ndarray, skip: int) -> np.ndarray:
     """Touchdowns of each leg: contact after at least `min_air` samples without.
 
     Args:
         contacts: shape (n, 4), true on the ground.
-        min_air: samples in the air that make a flight; shorter gaps are bounces.
+        min_air: samples in the air that make a flight, one number or one per sample; shorter gaps are bounces.
         skip: touchdowns before this sample do not count (the flight before one may begin earlier).
 
     Returns:
@@ -110,8 +110,9 @@ def touchdowns(contacts: np.ndarray, min_air: int, skip: int) -> np.ndarray:
     """
     air = np.zeros(4, dtype=int)
     count = np.zeros(4, dtype=int)
+    flights = np.broadcast_to(min_air, len(contacts))
     for i, on_ground in enumerate(np.asarray(contacts, dtype=bool)):
-        count += on_ground & (air >= min_air) & (i >= skip)
+        count += on_ground & (air >= flights[i]) & (i >= skip)
         air = np.where(on_ground, 0, air + 1)
     return count
 

@@ -10,6 +10,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 from tqdm.auto import tqdm
 
+from go1_mtl_gym import TASKS
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.expert import check_expert_fits
 from go1_mtl_gym.validation import finite_vector
@@ -149,7 +150,7 @@ class Rollout:
         Raises:
             InvalidInputError: if the environment ends the episode before these steps are done.
         """
-        measured, wanted, contacts, running = [], [], [], []
+        measured, wanted, contacts, running, gaits, moves = [], [], [], [], [], []
         for i in range(0 if self.fallen else steps):
             if self._over:
                 raise InvalidInputError(f"the environment ended an episode {steps - i} steps too early")
@@ -160,6 +161,8 @@ class Rollout:
             measured.append(self._info["base_velocity"])
             wanted.append(self._info["filtered_command"])
             contacts.append(self._info["contacts"])
+            gaits.append(TASKS[self._info["task"]].gait)
+            moves.append(self._info.get("operator_move", ""))
             self.fallen, self._over = bool(terminated), bool(terminated or truncated)
             if self.fallen:
                 break
@@ -168,6 +171,8 @@ class Rollout:
             wanted=np.array(wanted, dtype=float).reshape(-1, 3),
             contacts=np.array(contacts, dtype=bool).reshape(-1, 4),
             running=np.array(running, dtype=bool),
+            gaits=tuple(gaits),
+            moves=tuple(moves) if any(moves) else (),
         )
 
 

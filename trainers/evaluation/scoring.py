@@ -32,12 +32,16 @@ class Series:
         wanted: the filtered command, shape (n, 3).
         contacts: feet on the ground, bool, shape (n, 4).
         running: whether the gait clock ran during the step, bool, shape (n,).
+        gaits: that the clock was of, after each step.
+        moves: what the hands were doing, if there are any; empty otherwise.
     """
 
     measured: np.ndarray
     wanted: np.ndarray
     contacts: np.ndarray
     running: np.ndarray
+    gaits: tuple[Gait, ...]
+    moves: tuple[str, ...] = ()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -141,8 +145,8 @@ def score(
     fallen: bool,
     seed: int,
     commands: tuple[tuple[float, float, float], ...],
-    gait: Gait,
     control_hz: float,
+    gait: Gait | None = None,
 ) -> EpisodeRecord:
     """Figures of one episode.
 
@@ -151,20 +155,22 @@ def score(
         fallen: whether it ended in a fall.
         seed: kept in the record.
         commands: likewise.
-        gait: what was asked for.
         control_hz: steps per second.
+        gait: what was asked for all the time; None where it changed: what the environment says it was.
     """
+    if gait is not None:
+        series = dataclasses.replace(series, gaits=(gait,) * len(series.gaits))
     skip, steps = round(SETTLE_S * control_hz), len(series.measured)
-    window = max(1, round(gait.period * control_hz))
+    window = max(1, round(max((gait.period for gait in series.gaits), default=0.0) * control_hz))
     velocity_error, yaw_error = tracking_error(series.measured, series.wanted, window, skip)
     counted_s = (steps - skip) / control_hz
     rate, stepped = np.full(4, np.nan), False
     if counted_s > 0:
-        count = touchdowns(series.contacts, math.ceil(MIN_AIR_SHARE * gait.swing_s * control_hz - 1e-9), skip)
-        running = series.running[skip:]
-        wanted_count = gait.step_rate * running.sum() / control_hz
-        stood = 0 if running.all() else STAND_TOUCHDOWNS
-        slack = max(STEP_RATE_TOLERANCE * wanted_count, stood)
+        count = touchdowns(series.contacts, _min_air(series, control_hz), skip)
+        cycles = np.array([gait.step_rate for gait in series.gaits]) / control_hz
+        wanted_count = (cycles * series.running)[skip:].sum()
+        stood = 0 if series.running[skip:].all() else STAND_TOUCHDOWNS
+        slack = max(STEP_RATE_TOLERANCE * wanted_count, stood) + _changes_of_gait(series, skip)
         rate, stepped = count / counted_s, bool((np.abs(count - wanted_count) <= slack + 1e-9).all())
     return EpisodeRecord(
         seed=seed,
@@ -176,6 +182,18 @@ def score(
         step_rate=tuple(rate.tolist()),
         success=bool(not fallen and velocity_error <= VELOCITY_TOLERANCE and stepped),
     )
+
+
+def _min_air(series: Series, control_hz: float) -> np.ndarray:
+    """Samples in the air that make a flight, at every step, int, shape (n,)."""
+    swing_s = np.array([gait.swing_s for gait in series.gaits])
+    return np.ceil(MIN_AIR_SHARE * swing_s * control_hz - 1e-9).astype(int)
+
+
+def _changes_of_gait(series: Series, skip: int) -> int:
+    """After the first samples: each change cuts a cycle short, so that a leg may have one touchdown too many or few."""
+    gaits = series.gaits[skip:]
+    return sum(before != after for before, after in zip(gaits, gaits[1:]))
 
 
 def _mean(values: Sequence[float] | np.ndarray) -> float:

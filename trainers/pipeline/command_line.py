@@ -4,7 +4,7 @@ import argparse
 import os
 from collections.abc import Sequence
 
-from go1_mtl_gym import PAPER_TASKS, TASKS
+from go1_mtl_gym import TASKS
 from go1_mtl_gym.sensing.observation import CHANNELS
 from trainers.pipeline.config import PRESETS, JobConfig
 
@@ -36,7 +36,7 @@ def job_parser() -> argparse.ArgumentParser:
     add = parser.add_argument
     add("--preset", choices=[*PRESETS], default="default", help="smoke: minutes; default: half an hour; paper: a day")
     add("--out", help="folder of the results; an interrupted run goes on in the same one (default: runs/<date>)")
-    add("--tasks", nargs="+", choices=tuple(TASKS), default=list(PAPER_TASKS), help="gaits, in head order")
+    add("--tasks", nargs="+", choices=tuple(TASKS), help="gaits, in head order; the preset's if not given")
     add("--rounds", type=int, default=None, help="DAgger rounds; the preset's if not given")
     add("--seed", type=int, default=0, help="of everything random")
     add("--n-envs", type=int, default=os.cpu_count() or 1, help="worker processes")

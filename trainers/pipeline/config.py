@@ -3,13 +3,13 @@
 import dataclasses
 import operator
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from numbers import Real
 from typing import Any
 
 import numpy as np
 
-from go1_mtl_gym import PAPER_TASKS, DomainRandomization
+from go1_mtl_gym import BUILT_IN_TASKS, DomainRandomization
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.sensing.observation import CHANNELS
 from go1_mtl_gym.tasks import check_task_names
@@ -18,6 +18,7 @@ from trainers.algorithms.bc import BCConfig
 from trainers.algorithms.dagger import DAggerConfig
 from trainers.algorithms.phase_free import PhaseConfig
 from trainers.data.environments import PerturbationConfig
+from trainers.data.operator import OperatorConfig
 from trainers.pipeline.presets import PRESETS
 from trainers.policies.normalization import MODES
 from trainers.utils.files import json_ready
@@ -52,11 +53,17 @@ class JobConfig:
         history: proprioceptive frames in the observation.
         control_hz: rate of the policy [Hz].
         kp, kd: gains of the actuators [N m/rad, N m s/rad].
-        clean_s, perturbed_s, held_out_s: demonstrations: undisturbed, perturbed, and undisturbed for the R2.
+        clean_s, perturbed_s, hard_push_s, held_out_s: demonstrations: undisturbed, perturbed, perturbed and pushed
+            hard, and undisturbed for the R2.
+        operator: whose hands drive in perturbed demonstrations, rounds and evaluation; None draws commands and gaits.
+        hard_push_interval: mean time between pushes at the edge of what the expert bears in `hard_push_s` [s]; in
+            rounds they come half as often. None pushes hard nowhere.
         randomized: fraction of the perturbed episodes whose physics and sensor noise are drawn, by the ranges of
             `go1_mtl_gym.DomainRandomization`.
-        task_interval: shortest and longest time between changes of gait in perturbed episodes, or None.
-        corner_fraction: probability with which a new command in them is a corner of its range.
+        task_interval: shortest and longest time between changes of gait in perturbed episodes without an operator, or
+            None.
+        corner_fraction: probability with which a new command in these is a corner of its range.
+        mirror: whether to learn from the mirror image of every row too.
         shard_s: length of a shard, which begins with a standing start.
         dagger_s: recorded in each DAgger round.
         takeover_rad: of the DAgger rounds, see `trainers.DAggerConfig`.
@@ -67,8 +74,8 @@ class JobConfig:
         phase_free_s: the policy's walks that the phase-free policy learns the phase from, per gait; 0 makes none.
         phase_free_history: frames of proprioception that it reads.
         phase_free_steps: gradient steps of its phase estimator.
-        episodes, episode_s, command_interval: of the closed-loop evaluation, per task and agent; a new command comes
-            every so many seconds.
+        episodes, episode_s, command_interval: of the closed-loop evaluation, per task and agent, with drawn commands
+            that change every so many seconds, and as many episodes in the operator's hands.
         round_episodes: episodes per task after each DAgger round.
         video_s: length of the videos.
 
@@ -77,7 +84,7 @@ class JobConfig:
     """
 
     preset: str = "default"
-    tasks: tuple[str, ...] = PAPER_TASKS
+    tasks: tuple[str, ...] = BUILT_IN_TASKS
     rounds: int = _from(0, 3)
     seed: int = _from(0, 0)
     n_envs: int = _from(1, os.cpu_count() or 1)
@@ -90,10 +97,14 @@ class JobConfig:
     kd: float = _from(0, 2.0)
     clean_s: float = _from(0, 60.0)
     perturbed_s: float = _from(0, 300.0)
+    hard_push_s: float = _from(0, 90.0)
+    operator: OperatorConfig | None = OperatorConfig()
+    hard_push_interval: float | None = _from(0, 4.0, above=True)
     held_out_s: float = _from(0, 60.0, above=True)
     randomized: float = _from(0, 0.3)
     task_interval: tuple[float, float] | None = (2.0, 6.0)
     corner_fraction: float = _from(0, 0.25)
+    mirror: bool = True
     shard_s: float = _from(0, 15.0, above=True)
     dagger_s: float = _from(0, 60.0, above=True)
     takeover_rad: float | None = _from(0, None, above=True)
@@ -120,6 +131,8 @@ class JobConfig:
         object.__setattr__(self, "task_interval", interval_s(self.task_interval, "task_interval"))
         one_of(self.normalization, MODES, "normalization")
         one_of(str(self.device).partition(":")[0], DEVICES, "device")
+        if isinstance(self.operator, Mapping):
+            object.__setattr__(self, "operator", OperatorConfig(**self.operator))
         for name in ("randomized", "corner_fraction"):
             number_in(getattr(self, name), 0.0, 1.0, name)
         if min(self.shards(self.clean_s) + self.shards(self.perturbed_s), self.shards(self.held_out_s)) < 1:
@@ -172,14 +185,28 @@ class JobConfig:
         """What environments of perturbed episodes and of rounds have on top of `env_kwargs`."""
         return {"randomization": DomainRandomization(fraction=self.randomized)} if self.randomized else {}
 
-    def perturbation(self, noise_rad: float) -> PerturbationConfig:
-        """How an episode is perturbed, with action noise of at most `noise_rad` [rad]."""
-        several = len(self.tasks) > 1
+    def perturbation(self, noise_rad: float, hard_push_interval: float | None = None) -> PerturbationConfig:
+        """How an episode is perturbed.
+
+        Args:
+            noise_rad: largest standard deviation of the noise on actions [rad].
+            hard_push_interval: mean time between the hard pushes of the operator, if there is one [s].
+        """
+        operator, several = self.operator, len(self.tasks) > 1
+        if operator is not None:
+            operator = dataclasses.replace(operator, hard_push_interval=hard_push_interval)
         return PerturbationConfig(
             noise_rad=noise_rad,
             corner_fraction=self.corner_fraction,
             task_interval=self.task_interval if several else None,
+            operator=operator,
         )
+
+    @property
+    def round_perturbation(self) -> PerturbationConfig:
+        """How the episodes of DAgger rounds are perturbed: the learner's own errors come on top."""
+        interval = None if self.hard_push_interval is None else 2 * self.hard_push_interval
+        return self.perturbation(ROUND_NOISE_RAD, interval)
 
     def shards(self, seconds: float) -> int:
         """How many shards hold the seconds of one task."""
@@ -199,7 +226,13 @@ class JobConfig:
     def bc(self) -> BCConfig:
         """How to clone."""
         interval = max(50, self.clone_steps // 30)  # each entry of the log costs a pass over the held-out rows
-        return BCConfig(steps=self.clone_steps, batch_size=self.batch_size, log_interval=interval, seed=self.seed)
+        return BCConfig(
+            steps=self.clone_steps,
+            batch_size=self.batch_size,
+            log_interval=interval,
+            seed=self.seed,
+            mirror=self.mirror and self.history == 1,
+        )
 
     @property
     def round_bc(self) -> BCConfig:

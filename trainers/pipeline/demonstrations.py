@@ -34,10 +34,14 @@ def shard_jobs(
 
 
 def training_jobs(config: JobConfig) -> list[CollectJob]:
-    """Shards to learn from: clean ones, then perturbed ones with drawn physics."""
+    """Shards to learn from: clean ones, then perturbed ones with drawn physics, then those that are pushed hard."""
     clean = shard_jobs(config, config.clean_s, 0)
     perturbation = config.perturbation(NOISE_RAD)
-    return clean + shard_jobs(config, config.perturbed_s, 1, perturbation, config.randomization_kwargs)
+    perturbed = shard_jobs(config, config.perturbed_s, 1, perturbation, config.randomization_kwargs)
+    if config.operator is None or config.hard_push_interval is None:
+        return clean + perturbed
+    hard = config.perturbation(NOISE_RAD, config.hard_push_interval)
+    return clean + perturbed + shard_jobs(config, config.hard_push_s, 3, hard, config.randomization_kwargs)
 
 
 def held_out_jobs(config: JobConfig) -> list[CollectJob]:

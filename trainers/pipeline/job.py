@@ -19,7 +19,7 @@ from trainers.evaluation.closed_loop import evaluate
 from trainers.evaluation.figures import joint_target_figure
 from trainers.evaluation.metrics import offline_metrics
 from trainers.pipeline.baselines import baseline_names, train_baselines
-from trainers.pipeline.config import NOISE_RAD, ROUND_NOISE_RAD, JobConfig
+from trainers.pipeline.config import NOISE_RAD, JobConfig
 from trainers.pipeline.demonstrations import held_out_jobs, training_jobs
 from trainers.pipeline.new_policy import new_policy
 from trainers.pipeline.pictures import save_videos
@@ -133,8 +133,7 @@ class Job:
         """One environment per task, as DAgger rounds want them."""
         config = self.config
         kwargs = config.env_kwargs | config.randomization_kwargs
-        perturbation = config.perturbation(ROUND_NOISE_RAD)
-        venv = make_venv(config.tasks, 1, kwargs, perturbation, subproc=config.n_envs > 1)
+        venv = make_venv(config.tasks, 1, kwargs, config.round_perturbation, subproc=config.n_envs > 1)
         try:
             yield venv
         finally:

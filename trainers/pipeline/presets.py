@@ -3,12 +3,15 @@
 import os
 from typing import Any
 
+from go1_mtl_gym import PAPER_TASKS
+
 PRESETS: dict[str, dict[str, Any]] = {
     "default": {},
     "smoke": {
         "rounds": 1,
         "clean_s": 3.0,
         "perturbed_s": 6.0,
+        "hard_push_s": 3.0,
         "held_out_s": 3.0,
         "shard_s": 3.0,
         "dagger_s": 2.0,
@@ -25,13 +28,16 @@ PRESETS: dict[str, dict[str, Any]] = {
     },
     # arXiv 2505.08574: 20 commands of 30 s per gait at 1 kHz, clean; min-max scaling; 2560 units; no DAgger.
     "paper": {
+        "tasks": PAPER_TASKS,
         "rounds": 0,
         "channels": (),
         "control_hz": 1000,
         "clean_s": 600.0,
         "perturbed_s": 0.0,
+        "hard_push_s": 0.0,
+        "operator": None,
+        "mirror": False,
         "randomized": 0.0,
-        "task_interval": None,
         "phase_free_s": 0.0,
         "held_out_s": 60.0,
         "shard_s": 30.0,

@@ -1,0 +1,116 @@
+"""The robot in a mirror: what is on its left is on its right, so that every row is worth two."""
+
+import dataclasses
+
+import numpy as np
+
+from go1_mtl_gym.contract import PolicyContract
+from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.gaits import STAND_COMMAND, Gait
+from trainers.data.demonstrations import Demonstrations
+
+OTHER_SIDE = np.array([1, 0, 3, 2])
+"""The leg on the other side of each of FL, FR, RL, RR."""
+_TRUE = np.array([1.0, -1.0, 1.0])
+"""Signs of a vector in the mirror, whose plane holds forward and up."""
+_AXIAL = np.array([-1.0, 1.0, -1.0])
+"""Signs of an angular velocity in the mirror."""
+_COMMAND = np.array([1.0, -1.0, -1.0])
+_JOINTS = np.array([-1.0, 1.0, 1.0])
+"""Signs of hip, thigh and calf."""
+_SHIFTS = np.arange(0.0, 1.0, 0.05)
+
+
+def mirror_shift(gait: Gait) -> float | None:
+    """By how much the gait clock is ahead in the mirror [cycles]; None if the mirrored gait is another one.
+
+    A clock x with offsets o in the mirror is a clock x + s with the offsets themselves: o[other side] = o + s (mod 1).
+    """
+    offsets = np.array(gait.offsets)
+    for shift in _SHIFTS.tolist():
+        turns = offsets[OTHER_SIDE] - offsets - shift
+        if np.allclose(turns, np.round(turns), atol=1e-6):
+            return shift
+    return None
+
+
+def mirrored(rows: Demonstrations) -> Demonstrations:
+    """The rows as they would be if left and right were exchanged, of all gaits that are the same in the mirror.
+
+    The readings of the inertial unit become those of one on the other side of the trunk. Where the clock rests it is at
+    phase 0 in the mirror too.
+
+    Args:
+        rows: with one frame of proprioception, and tasks whose gaits the contract names.
+
+    Returns:
+        Rows of those tasks whose gait is the same in the mirror, in order.
+
+    Raises:
+        InvalidInputError: if rows hold more frames, or a task's gait is not known.
+    """
+    contract = rows.contract
+    if contract.history != 1:
+        raise InvalidInputError(f"rows with one frame of proprioception were expected, got {contract.history}")
+    shifts = np.array([np.nan if (shift := mirror_shift(gait)) is None else shift for gait in _gaits(contract)])
+    rows = rows.take(np.isfinite(shifts[rows.task]))
+    return dataclasses.replace(
+        rows, obs=_mirrored_obs(rows.obs, contract, shifts[rows.task]), acts=_mirrored_joints(rows.acts)
+    )
+
+
+def with_mirrored(rows: Demonstrations, weights: np.ndarray | None = None) -> tuple[Demonstrations, np.ndarray]:
+    """Rows and their mirror images, and how often each is to be drawn.
+
+    Args:
+        rows: as of `mirrored`.
+        weights: of the rows, positive integers, shape (n,); None gives every row the weight 1.
+    """
+    weights = np.ones(len(rows), dtype=np.int64) if weights is None else np.asarray(weights)
+    image = mirrored(rows)
+    has_image = np.array([mirror_shift(gait) is not None for gait in _gaits(rows.contract)])[rows.task]
+    return Demonstrations.concatenate([rows, image]), np.concatenate([weights, weights[has_image]])
+
+
+def _gaits(contract: PolicyContract) -> list[Gait]:
+    gaits = [gait for gait in contract.gaits if gait is not None]
+    if len(gaits) < contract.n_tasks:
+        raise InvalidInputError(f"a contract that names the gaits of all its tasks was expected, got {contract.gaits}")
+    return gaits
+
+
+def _mirrored_obs(obs: np.ndarray, contract: PolicyContract, shift: np.ndarray) -> np.ndarray:
+    image, where = obs.copy(), contract.slices
+    for name, sign in (("accelerometer", _TRUE), ("gyroscope", _AXIAL), ("gravity", _TRUE), ("command", _COMMAND)):
+        if name in where:
+            image[:, where[name]] *= sign.astype(np.float32)
+    for name in ("q", "dq", "last_action"):
+        if name in where:
+            image[:, where[name]] = _mirrored_joints(obs[:, where[name]])
+    image[:, where["contacts"]] = obs[:, where["contacts"]][:, OTHER_SIDE]
+    if "leg_kinematics" in where:
+        feet = obs[:, where["leg_kinematics"]].reshape(-1, 2, 4, 3)[:, :, OTHER_SIDE] * _TRUE
+        image[:, where["leg_kinematics"]] = feet.reshape(len(obs), -1)
+    if "phase" in where:
+        image[:, where["phase"]] = _turned(obs[:, where["phase"]], np.where(_rests(obs, contract), 0.0, shift))
+    return image
+
+
+def _rests(obs: np.ndarray, contract: PolicyContract) -> np.ndarray:
+    """Where the clock rests, as far as an observation tells, bool, shape (n,)."""
+    where = contract.slices
+    at_zero = (obs[:, where["phase"]] == [0.0, 1.0]).all(axis=1)
+    if "command" not in where:
+        return at_zero
+    return at_zero & (np.abs(obs[:, where["command"]]) < STAND_COMMAND).all(axis=1)
+
+
+def _turned(phase: np.ndarray, shift: np.ndarray) -> np.ndarray:
+    """Sine and cosine of clocks that are ahead by some shift [cycles], shape (n, 2)."""
+    sin, cos = np.sin(2 * np.pi * shift), np.cos(2 * np.pi * shift)
+    return np.stack([phase[:, 0] * cos + phase[:, 1] * sin, phase[:, 1] * cos - phase[:, 0] * sin], axis=1)
+
+
+def _mirrored_joints(joints: np.ndarray) -> np.ndarray:
+    """Joint values of the other side, shape (n, 12)."""
+    return (joints.reshape(-1, 4, 3)[:, OTHER_SIDE] * _JOINTS).reshape(len(joints), -1).astype(np.float32)

@@ -1,0 +1,105 @@
+"""An environment in somebody's hands."""
+
+from typing import Any, cast
+
+import gymnasium
+import numpy as np
+
+from go1_mtl_gym import TASKS, Go1Env
+from go1_mtl_gym.errors import InvalidInputError
+from trainers.data.operator import OperatorConfig, OperatorPlan, Push, draw_plan
+
+LONGEST_S = 600.0
+"""Plans are drawn for episodes of up to this length [s]; afterwards the stick stays where it is."""
+
+
+class OperatorWrapper(gymnasium.Wrapper):
+    """Moves the stick, changes the gait and pushes the robot as `draw_plan` says.
+
+    A reset with a seed draws a plan that depends on that seed and the task alone, so that every policy meets the same
+    hands. The command is the stick times the `command_range` of the task that was asked for last.
+
+    ``info["operator_move"]`` names the move of the present instant, ``info["operator_events"]`` what came with the last
+    step: "push", or the name of a task.
+
+    Args:
+        env: a `Go1Env`, wrapped or not.
+        config: how often hands do what; None is the default.
+    """
+
+    def __init__(self, env: gymnasium.Env, config: OperatorConfig | None = None) -> None:
+        super().__init__(env)
+        self.operator = config or OperatorConfig()
+        self._rng = np.random.default_rng()
+        self._plan: OperatorPlan | None = None
+
+    @property
+    def plan(self) -> OperatorPlan | None:
+        """What the hands do in this episode; None before the first reset."""
+        return self._plan
+
+    @property
+    def _go1(self) -> Go1Env:
+        return cast(Go1Env, self.env.unwrapped)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[np.ndarray, dict[str, Any]]:
+        """Reset the environment, and draw what the hands will do.
+
+        Args:
+            seed: of the environment and of the hands.
+            options: ``task`` as of `Go1Env.reset`.
+
+        Raises:
+            InvalidInputError: as `Go1Env.reset`, and if there is a ``command`` among the options.
+        """
+        if options and options.get("command") is not None:
+            raise InvalidInputError(
+                f"the operator gives the commands; got the reset option command={options['command']!r}"
+            )
+        env = self._go1
+        observation, info = self.env.reset(seed=seed, options=options)
+        if seed is not None:
+            self._rng = np.random.default_rng([seed, 0x5EED_0F])
+        seconds = min(env.config.episode_s, LONGEST_S) + 1.0
+        self._plan = draw_plan(self.operator, env.task.name, env.tasks, seconds, self._rng)
+        self._move_stick(self._plan, 0.0)
+        self._time_s = 0.0
+        told = {"command": env.command, "operator_move": self._plan.move(0.0), "operator_events": ()}
+        return observation, info | told
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
+        """Step, with whatever the hands do at its beginning."""
+        env, plan = self._go1, self._plan
+        events: tuple[str, ...] = ()
+        if plan is not None:
+            before, self._time_s = self._time_s, self._time_s + env.control_s
+            tasks, pushes = plan.changes_in(before, self._time_s), plan.pushes_in(before, self._time_s)
+            for task in tasks:
+                self._change_task(task)
+            for push in pushes:
+                self._push(push)
+            self._move_stick(plan, self._time_s)
+            events = (*tasks, *("push" for _ in pushes))
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        told = {"operator_move": plan.move(self._time_s) if plan else "", "operator_events": events}
+        return observation, float(reward), terminated, truncated, info | told
+
+    def _move_stick(self, plan: OperatorPlan, time_s: float) -> None:
+        env = self._go1
+        reach = self.operator.deflection * np.array(env.requested_task.command_range)
+        env.set_command(plan.stick(time_s) * reach)
+
+    def _push(self, push: Push) -> None:
+        env = self._go1
+        size = push.size * env.task.largest_push(push.angle) if push.hard else push.size
+        angle = push.angle + env.state.rpy[2]
+        env.push([size * np.cos(angle), size * np.sin(angle), 0.0])
+
+    def _change_task(self, task: str) -> None:
+        """Press a button; a command that the new task does not know is brought to its border first."""
+        env, limit = self._go1, np.array(TASKS[task].command_limit)
+        within = np.minimum(limit, env.requested_task.command_limit)
+        env.set_command(np.clip(env.command, -within, within))
+        env.set_task(task)
