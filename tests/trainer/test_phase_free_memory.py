@@ -11,11 +11,12 @@ import torch
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
 
+import trainers
 from go1_mtl_gym import PAPER_TASKS
 from go1_mtl_gym.errors import InvalidInputError
 from tests.trainer.stub_env import StubEnv, make_stub
-from tests.trainer.test_phase_free import BLIND, BOUND, JUMP, TROT, WALK, rows
-from trainers import Learner, PhaseEstimator, PhaseFreePolicy, offline_metrics, train_phase_free, watch
+from tests.trainer.test_phase_free import BLIND, BOUND, JUMP, TROT, WALK, oracle, rows, turns
+from trainers import Learner, MultiHeadPolicy, PhaseEstimator, PhaseFreePolicy, offline_metrics, train_phase_free, watch
 from trainers.data.stateful import act_on_rows
 from trainers.policies.phase_free import CORRECTION, phase_free_layout
 
@@ -121,6 +122,25 @@ def test_what_was_refused_is_not_remembered(phase_free):
         with pytest.raises(InvalidInputError, match=r"one bool or 2, one an observation, got shape"):
             phase_free.predict(obs, episode_start=starts)
     np.testing.assert_array_equal(act(phase_free, obs), act(other, obs))
+
+
+def test_a_change_out_of_a_jump_begins_the_clock_when_the_environment_does():
+    """The environment waits for the middle of the stance; until then the task id and the clock are the jump's."""
+    env = trainers.make_env("jump", tasks=("jump", "trot"), channels=("command", "phase"))
+    base = env.unwrapped
+    policy = MultiHeadPolicy(env.observation_space, env.action_space, contract=base.contract, width=8, seed=0)
+    phase_free = oracle(policy, lambda: info["phase"], 0.3, history=1)
+    columns = base.layout.columns(phase_free.estimator.layout)
+    obs, info = env.reset(seed=0, options={"command": (0.3, 0.0, 0.0)})
+    errors, tasks = [], []
+    for step in range(60):
+        clock = phase_free.predict(obs[columns])[1][0]
+        errors.append(abs((turns(clock).item() - info["phase"] + 0.5) % 1.0 - 0.5))
+        tasks.append(info["task"])
+        if step == 32:
+            base.set_task("trot")
+        obs, *_, info = env.step(env.expert_action())
+    assert tasks[33] == "jump" and tasks[-1] == "trot" and max(errors[30:]) < 1e-5
 
 
 @pytest.mark.parametrize("n", [-1, 1.5, None])
