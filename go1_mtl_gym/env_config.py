@@ -17,7 +17,7 @@ from go1_mtl_gym.validation import integer_in, number_in, one_of, parameters_of,
 
 DEFAULT_TASKS = BUILT_IN_TASKS
 """What an environment knows unless told otherwise, besides its own task: the tasks of the policy in the package."""
-DEFAULT_CHANNELS = ("command", "phase", "last_action")
+DEFAULT_CHANNELS = ("command", "phase", "last_action", "leg_kinematics")
 """What an environment shows unless told otherwise: the channels that the policy in the package sees."""
 RENDER_MODES = ("human", "rgb_array")
 PIXELS = (16, 4096)

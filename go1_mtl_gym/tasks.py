@@ -113,7 +113,7 @@ _REGISTRY = {
         Task(
             "jump",
             GAITS["jump"],
-            command_range=(1.3, 0.5, 1.5),
+            command_range=(1.1, 0.4, 1.2),
             command_limit=(1.7, 0.7, 3.0),
             push_limit=(2.0, 1.9, 1.0),
         ),

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from go1_mtl_gym import BUILT_IN_TASKS, DomainRandomization
+from go1_mtl_gym.env_config import DEFAULT_CHANNELS
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.sensing.observation import CHANNELS
 from go1_mtl_gym.tasks import check_task_names
@@ -90,7 +91,7 @@ class JobConfig:
     n_envs: int = _from(1, os.cpu_count() or 1)
     device: str = "cpu"
     threads: int = _from(1, 1)
-    channels: tuple[str, ...] = ("command", "phase", "last_action")
+    channels: tuple[str, ...] = DEFAULT_CHANNELS
     history: int = _from(1, 1)
     control_hz: int = _from(1, 50)
     kp: float = _from(0, 50.0, above=True)
