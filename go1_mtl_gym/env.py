@@ -71,8 +71,9 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
 
     ## Episodes
 
-    Start standing at phase 0 of the gait clock, joints within 0.03 rad of the home pose. Terminate on a fall (trunk
-    below 0.14 m, or tilted by more than 60 degrees) or when the physics diverges. Truncate after `episode_s`.
+    Start standing at phase 0 of the gait clock, joints within 0.03 rad of the home pose, settled for `settle_s`.
+    Terminate on a fall (trunk below 0.14 m, or tilted by more than 60 degrees) or when the physics diverges. Truncate
+    after `episode_s`.
 
     ``info``: task, command, filtered_command, base_velocity (vx, vy, yaw rate in the heading frame), contacts, phase,
     standing, reward_terms, fallen, ended ("", "fall", "unstable" or "time").

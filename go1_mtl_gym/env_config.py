@@ -11,7 +11,7 @@ from go1_mtl_gym.sensing.observation import ObservationLayout, SensorNoise
 from go1_mtl_gym.sensing.sensor_faults import SensorParams
 from go1_mtl_gym.sensing.state_estimator import StateEstimatorConfig
 from go1_mtl_gym.sensing.state_noise import EstimatorNoise
-from go1_mtl_gym.sim.domain_randomization import DomainRandomization
+from go1_mtl_gym.sim.domain_randomization import SETTLE_S, DomainRandomization
 from go1_mtl_gym.sim.physics_params import PhysicsParams
 from go1_mtl_gym.tasks import PAPER_TASKS, check_task_names
 from go1_mtl_gym.validation import integer_in, number_in, one_of, parameters_of, switch
@@ -59,6 +59,8 @@ class EnvConfig:
         width, height: of the picture [pixels].
         physics: differences from the expert's model.
         sensors: faults of the readings that are observed; the expert's state has none.
+        settle_s: time for which the robot stands before the episode begins [s], rounded to milliseconds: under
+            action 0, until joints and feet have given way.
 
     Raises:
         InvalidInputError: if something is not as described.
@@ -82,6 +84,7 @@ class EnvConfig:
     height: int = 480
     physics: PhysicsParams = field(default_factory=PhysicsParams)
     sensors: SensorParams = field(default_factory=SensorParams)
+    settle_s: float = 0.0
 
     def __post_init__(self) -> None:
         """Check everything, and bring it into its one form."""
@@ -105,6 +108,7 @@ class EnvConfig:
             height=integer_in(self.height, *PIXELS, "height [pixels]"),
             physics=parameters_of(self.physics, PhysicsParams, "physics"),
             sensors=parameters_of(self.sensors, SensorParams, "sensors"),
+            settle_s=number_in(self.settle_s, *SETTLE_S, "settle_s [s]"),
         )
         self._check_together()
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from go1_mtl_gym import robot
+from go1_mtl_gym.actuation import PHYSICS_HZ
 from go1_mtl_gym.env_config import EnvConfig
 from go1_mtl_gym.gaits import next_phase, passes
 from go1_mtl_gym.rewards import reward_terms
@@ -190,7 +191,7 @@ def begin_episode(
     task: str | None = None,
     command: np.ndarray | None = None,
 ) -> Episode:
-    """Stand the robot up, and begin an episode there.
+    """Stand the robot up, let it settle, and begin an episode there.
 
     Args:
         config: the environment's.
@@ -207,6 +208,7 @@ def begin_episode(
     if config.randomization is not None:
         simulation.set_physics_params(conditions.physics)
     simulation.reset(robot.HOME_POSE + joint_noise)
+    simulation.settle(robot.HOME_POSE, round(conditions.settle_s * PHYSICS_HZ))
     return Episode(
         chosen,
         drawn if command is None else command,
@@ -219,7 +221,7 @@ def begin_episode(
 
 def _conditions(config: EnvConfig, rng: np.random.Generator) -> EpisodeConditions:
     sensors = config.sensors.drawn(_stream(rng)) if config.sensors.is_drawn else config.sensors
-    own = EpisodeConditions(config.physics, sensors)
+    own = EpisodeConditions(config.physics, sensors, settle_s=config.settle_s)
     return own if config.randomization is None else config.randomization.draw(_stream(rng), own)
 
 

@@ -13,6 +13,8 @@ from go1_mtl_gym.validation import finite_vector, number_in
 Range = tuple[float, float] | None
 _OF_SENSORS = {"encoder_offset": "encoder_offset", "sensor_delay_s": "delay_s"}
 """Ranges of fields of `SensorParams`."""
+SETTLE_S = (0.0, 10.0)
+"""Shortest and longest time for which a robot may stand before an episode begins [s]."""
 
 
 @dataclass(frozen=True)
@@ -23,11 +25,13 @@ class EpisodeConditions:
         physics: differences from the expert's model.
         sensors: faults of the readings.
         noise: factor on the sensor noise; None leaves the noise as it is.
+        settle_s: time for which the robot stands before the episode begins [s].
     """
 
     physics: PhysicsParams = field(default_factory=PhysicsParams)
     sensors: SensorParams = field(default_factory=SensorParams)
     noise: float | None = None
+    settle_s: float = 0.0
 
 
 @renamed_arguments(share="fraction")
@@ -41,6 +45,7 @@ class DomainRandomization:
         noise: factor on the environment's `SensorNoise`, or on the default one if the environment has none.
         encoder_offset: largest constant error of the joint positions [rad]; each joint's is drawn within it.
         sensor_delay_s: age of the readings [s].
+        settle_s: time for which the robot stands before the episode begins [s].
         fraction: of the episodes that are randomized; the others are as without randomization.
 
     Raises:
@@ -58,6 +63,7 @@ class DomainRandomization:
     joint_damping: Range = (0.0, 1.0)
     encoder_offset: Range = (0.0, 0.06)
     sensor_delay_s: Range = (0.0, 0.02)
+    settle_s: Range = (0.0, 0.5)
     fraction: float = 1.0
 
     def __post_init__(self) -> None:
@@ -71,6 +77,8 @@ class DomainRandomization:
             for end in (low, high):
                 if name == "noise":
                     number_in(end, 0.0, 10.0, "factor on the sensor noise")
+                elif name == "settle_s":
+                    number_in(end, *SETTLE_S, "settle_s [s]")
                 elif name in _OF_SENSORS:
                     SensorParams(**{_OF_SENSORS[name]: end})
                 else:
@@ -89,12 +97,12 @@ class DomainRandomization:
             name: min(low + level[name] * (high - low), high)  # rounding must not lead beyond the end
             for name, (low, high) in self._ranges().items()
         }
-        noise = drawn.pop("noise", base.noise)
+        noise, settle_s = drawn.pop("noise", base.noise), drawn.pop("settle_s", base.settle_s)
         faults = {own: drawn.pop(name) for name, own in _OF_SENSORS.items() if name in drawn}
         sensors = replace(base.sensors, **faults).drawn(rng)
         if chance >= self.fraction:
             return base
-        return EpisodeConditions(replace(base.physics, **drawn), sensors, noise)
+        return EpisodeConditions(replace(base.physics, **drawn), sensors, noise, settle_s)
 
     def _ranges(self) -> dict[str, tuple[float, float]]:
         """The ranges that are not None, by name."""

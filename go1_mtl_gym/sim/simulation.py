@@ -105,6 +105,17 @@ class Simulation:
         mujoco.mj_forward(self.model, self.data)
         return reading
 
+    def settle(self, target: np.ndarray, physics_steps: int) -> None:
+        """Let a robot that was reset give way under its weight; its time begins afterwards.
+
+        Args:
+            target: of the joints meanwhile [rad], shape (12,).
+            physics_steps: for how long; 0 changes nothing.
+        """
+        if physics_steps:
+            self.step(target, physics_steps)
+            self.data.time = 0.0
+
     def _hold(self, target: np.ndarray, physics_steps: int) -> None:
         for held, steps in self._delay.send(target, physics_steps):
             self.data.ctrl[:] = held
