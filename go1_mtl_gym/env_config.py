@@ -8,9 +8,10 @@ from go1_mtl_gym.actuation import PHYSICS_HZ, PDGains
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.expert import DEFAULT_EXPERT, check_expert
 from go1_mtl_gym.sensing.observation import ObservationLayout, SensorNoise
+from go1_mtl_gym.sensing.sensor_faults import SensorParams
 from go1_mtl_gym.sensing.state_estimator import StateEstimatorConfig
 from go1_mtl_gym.sensing.state_noise import EstimatorNoise
-from go1_mtl_gym.sim.domain_randomization import DomainRandomization
+from go1_mtl_gym.sim.domain_randomization import SETTLE_S, DomainRandomization
 from go1_mtl_gym.sim.physics_params import PhysicsParams
 from go1_mtl_gym.tasks import BUILT_IN_TASKS, check_task_names
 from go1_mtl_gym.validation import integer_in, number_in, one_of, parameters_of, switch
@@ -51,12 +52,15 @@ class EnvConfig:
         noise: of the sensors; True is the default one, None and False are exact sensors, a dictionary holds its fields.
         estimator_noise: on the state that the expert sees; likewise.
         state_estimator: that tells the expert the state from the sensors; likewise, and not with `estimator_noise`.
-        randomization: of physics and sensor noise at every reset; likewise.
+        randomization: of physics and sensors at every reset; likewise.
         episode_s: length of an episode [s].
         expert: ``"module:name"`` or a callable; a class or function that can be imported becomes a string.
         render_mode: None, "human" or "rgb_array".
         width, height: of the picture [pixels].
         physics: differences from the expert's model.
+        sensors: faults of the readings that are observed; the expert's state has none.
+        settle_s: time for which the robot stands before the episode begins [s], rounded to milliseconds: under
+            action 0, until joints and feet have given way.
 
     Raises:
         InvalidInputError: if something is not as described.
@@ -79,6 +83,8 @@ class EnvConfig:
     width: int = 640
     height: int = 480
     physics: PhysicsParams = field(default_factory=PhysicsParams)
+    sensors: SensorParams = field(default_factory=SensorParams)
+    settle_s: float = 0.0
 
     def __post_init__(self) -> None:
         """Check everything, and bring it into its one form."""
@@ -101,6 +107,8 @@ class EnvConfig:
             width=integer_in(self.width, *PIXELS, "width [pixels]"),
             height=integer_in(self.height, *PIXELS, "height [pixels]"),
             physics=parameters_of(self.physics, PhysicsParams, "physics"),
+            sensors=parameters_of(self.sensors, SensorParams, "sensors"),
+            settle_s=number_in(self.settle_s, *SETTLE_S, "settle_s [s]"),
         )
         self._check_together()
 

@@ -19,6 +19,7 @@ CHANGED_ARRAYS = (
     "geom_friction",
     "geom_solref",
     "dof_frictionloss",
+    "dof_damping",
     "actuator_gainprm",
     "actuator_biasprm",
     "actuator_forcerange",
@@ -32,7 +33,8 @@ _ALLOWED = {
     "motor_strength": Limits(0.5, 1.5),
     "joint_friction": Limits(0.0, 5.0, " [N m]"),
     "rotor_inertia": Limits(0.0, 0.1, " [kg m^2]"),
-    "contact_time_s": Limits(0.002, 0.1, " [s]"),
+    "contact_time_s": Limits(0.002, 0.2, " [s]"),
+    "joint_damping": Limits(0.0, 3.0, " [N m s/rad]"),
 }
 
 
@@ -48,6 +50,7 @@ class PhysicsParams:
         joint_friction: dry friction of every joint [N m], or None for the model's own.
         rotor_inertia: of every motor, as its joint feels it [kg m^2], or None for the model's own.
         contact_time_s: time constant of the contacts of the feet [s], small is stiff; None for the model's own.
+        joint_damping: torque per speed that brakes every joint [N m s/rad], or None for the model's own.
 
     Raises:
         InvalidInputError: if a figure is outside its range.
@@ -60,6 +63,7 @@ class PhysicsParams:
     joint_friction: float | None = None
     rotor_inertia: float | None = None
     contact_time_s: float | None = None
+    joint_damping: float | None = None
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -71,7 +75,7 @@ class PhysicsParams:
         return round(self.action_delay_s * PHYSICS_HZ)
 
     def as_vector(self) -> np.ndarray:
-        """All figures in their order, shape (7,); None is -1."""
+        """All figures in their order, shape (8,); None is -1."""
         return np.array([_NONE if value is None else value for value in astuple(self)], dtype=np.float64)
 
     @classmethod
@@ -99,6 +103,8 @@ class PhysicsParams:
             model.dof_frictionloss[6:] = self.joint_friction
         if self.rotor_inertia is not None:
             model.dof_armature[6:] = self.rotor_inertia
+        if self.joint_damping is not None:
+            model.dof_damping[6:] = self.joint_damping
         if self.contact_time_s is not None:
             model.geom_solref[[model.geom(f"{leg}_foot").id for leg in robot.LEGS], 0] = self.contact_time_s
 

@@ -1,27 +1,18 @@
 """The robot in MuJoCo: stepping, reading and writing its state. Knows nothing of tasks, gaits or rewards."""
 
-from dataclasses import dataclass
-
 import mujoco
 import numpy as np
 
 from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PHYSICS_HZ, PDGains
+from go1_mtl_gym.rotations import matrix_from_quat
+from go1_mtl_gym.sensing.sensor_faults import Reading
 from go1_mtl_gym.sim.physics_params import CHANGED_ARRAYS, INERTIAL_ARRAYS, ActionDelay, PhysicsParams
 
 CONTACT_FORCE = 2.0
 """A foot counts as on the ground when it presses with more than this [N]."""
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 _UNSTABLE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
-
-
-@dataclass(frozen=True)
-class Reading:
-    """What the robot's sensors say at one instant; frames and units as in `go1_mtl_gym.sensing.observation`."""
-
-    accelerometer: np.ndarray
-    gyroscope: np.ndarray
-    contacts: np.ndarray
 
 
 class Simulation:
@@ -90,16 +81,45 @@ class Simulation:
         self._delay.reset(self.data.ctrl)
         self.physics_params = physics_params
 
-    def step(self, target: np.ndarray, physics_steps: int) -> None:
+    def step(self, target: np.ndarray, physics_steps: int, read_early: int = 0) -> Reading:
         """Command joint targets [rad], shape (12,), for a number of 1 ms steps; the delay decides when they are held.
 
         Sensors, contacts and torques read afterwards belong to the state after the step: `mj_step` leaves those of
         the state before it, so the forward pass is run once more.
+
+        Args:
+            target: of the joints.
+            physics_steps: for how long.
+            read_early: physics steps between the reading that is returned and the end, less than `physics_steps`. It
+                changes nothing about what happens, to the bit.
         """
+        self._hold(target, physics_steps - read_early)
+        if not read_early:
+            mujoco.mj_forward(self.model, self.data)
+            return self.read()
+        guess = self.data.qacc_warmstart.copy()  # that the solver begins with; the only state that `mj_forward` changes
+        mujoco.mj_forward(self.model, self.data)
+        reading = self.read()
+        self.data.qacc_warmstart[:] = guess
+        self._hold(target, read_early)
+        mujoco.mj_forward(self.model, self.data)
+        return reading
+
+    def settle(self, target: np.ndarray, physics_steps: int) -> None:
+        """Let a robot that was reset give way under its weight; its time begins afterwards.
+
+        Args:
+            target: of the joints meanwhile [rad], shape (12,).
+            physics_steps: for how long; 0 changes nothing.
+        """
+        if physics_steps:
+            self.step(target, physics_steps)
+            self.data.time = 0.0
+
+    def _hold(self, target: np.ndarray, physics_steps: int) -> None:
         for held, steps in self._delay.send(target, physics_steps):
             self.data.ctrl[:] = held
             mujoco.mj_step(self.model, self.data, nstep=steps)
-        mujoco.mj_forward(self.model, self.data)
 
     def push(self, delta_velocity_w: np.ndarray) -> None:
         """Add to the trunk's linear velocity [m/s], world frame, shape (3,), at once."""
@@ -138,12 +158,15 @@ class Simulation:
         return not warned and bool(np.isfinite(self.data.qpos).all() and np.isfinite(self.data.qvel).all())
 
     def read(self) -> Reading:
-        """The sensors' readings, without noise."""
+        """The sensors' readings, without noise and faults."""
         values = self.data.sensordata
         return Reading(
             accelerometer=values[self._sensor["accelerometer"]].copy(),
             gyroscope=values[self._sensor["gyroscope"]].copy(),
+            q=self.q,
+            dq=self.v,
             contacts=self.contacts,
+            gravity=-matrix_from_quat(self.data.qpos[3:7])[2],
         )
 
     def snapshot(self) -> np.ndarray:
