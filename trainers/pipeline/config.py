@@ -54,12 +54,12 @@ class JobConfig:
         history: proprioceptive frames in the observation.
         control_hz: rate of the policy [Hz].
         kp, kd: gains of the actuators [N m/rad, N m s/rad].
-        clean_s, perturbed_s, hard_push_s, held_out_s: demonstrations: undisturbed, perturbed, perturbed and pushed
-            hard, and undisturbed for the R2.
+        clean_s, perturbed_s, hard_push_s, randomized_s, held_out_s: demonstrations: undisturbed, perturbed, perturbed
+            and pushed hard, perturbed with physics and sensors that are drawn, and undisturbed for the R2.
         operator: whose hands drive in perturbed demonstrations, rounds and evaluation; None draws commands and gaits.
         hard_push_interval: mean time between pushes at the edge of what the expert bears in `hard_push_s` [s]; in
             rounds they come half as often. None pushes hard nowhere.
-        randomized: fraction of the perturbed episodes whose physics and sensor noise are drawn, by the ranges of
+        randomized: fraction of the episodes in rounds whose physics and sensors are drawn, by the ranges of
             `go1_mtl_gym.DomainRandomization`.
         task_interval: shortest and longest time between changes of gait in perturbed episodes without an operator, or
             None.
@@ -97,8 +97,9 @@ class JobConfig:
     kp: float = _from(0, 50.0, above=True)
     kd: float = _from(0, 2.0)
     clean_s: float = _from(0, 60.0)
-    perturbed_s: float = _from(0, 300.0)
+    perturbed_s: float = _from(0, 210.0)
     hard_push_s: float = _from(0, 90.0)
+    randomized_s: float = _from(0, 90.0)
     operator: OperatorConfig | None = OperatorConfig()
     hard_push_interval: float | None = _from(0, 4.0, above=True)
     held_out_s: float = _from(0, 60.0, above=True)
@@ -181,10 +182,10 @@ class JobConfig:
         """Of the paper-literal policy: the 34 numbers and the task id."""
         return self.env_kwargs | {"channels": (), "history": 1}
 
-    @property
-    def randomization_kwargs(self) -> dict[str, Any]:
-        """What environments of perturbed episodes and of rounds have on top of `env_kwargs`."""
-        return {"randomization": DomainRandomization(fraction=self.randomized)} if self.randomized else {}
+    @staticmethod
+    def randomization_kwargs(fraction: float) -> dict[str, Any]:
+        """What environments have on top of `env_kwargs` if a fraction of their episodes is randomized."""
+        return {"randomization": DomainRandomization(fraction=fraction)} if fraction else {}
 
     def perturbation(self, noise_rad: float, hard_push_interval: float | None = None) -> PerturbationConfig:
         """How an episode is perturbed.

@@ -137,7 +137,7 @@ class Job:
     def _venv(self) -> Iterator[VecEnv]:
         """One environment per task, as DAgger rounds want them."""
         config = self.config
-        kwargs = config.env_kwargs | config.randomization_kwargs
+        kwargs = config.env_kwargs | config.randomization_kwargs(config.randomized)
         venv = make_venv(config.tasks, 1, kwargs, config.round_perturbation, subproc=config.n_envs > 1)
         try:
             yield venv
@@ -168,7 +168,7 @@ class Job:
                     config=config.phase,
                     seed=config.seed,
                     progress=self.progress,
-                    **config.randomization_kwargs,
+                    **config.randomization_kwargs(config.randomized),
                 )
             phase_free.save(path)
         return {"phase_free": load(path)}
