@@ -69,6 +69,8 @@ def measure(
     if noise is not None:
         noise.apply(parts, rng)
     parts["leg_kinematics"] = leg_kinematics(parts["q"], parts["dq"], parts["gyroscope"])
+    if np.isfinite(sum(float(part.sum()) for part in parts.values())):
+        return parts
     return {name: np.nan_to_num(part) for name, part in parts.items()}
 
 
