@@ -2,6 +2,7 @@
 
 import mujoco
 import numpy as np
+import pytest
 
 from go1_mtl_gym import robot
 from go1_mtl_gym.kinematics import contact_points, leg_kinematics
