@@ -233,7 +233,7 @@ class JobConfig:
             batch_size=self.batch_size,
             log_interval=interval,
             seed=self.seed,
-            mirror=self.mirror and self.history == 1,
+            mirror=self.mirror,
         )
 
     @property
