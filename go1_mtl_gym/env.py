@@ -19,6 +19,7 @@ from go1_mtl_gym.episode import Episode, begin_episode, how_it_ended
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.expert import Expert, make_expert
 from go1_mtl_gym.gaits import check_phase
+from go1_mtl_gym.privileged import privileged_state
 from go1_mtl_gym.registration import register_task
 from go1_mtl_gym.sensing.sensor_faults import Reading
 from go1_mtl_gym.sensing.state import RobotState
@@ -81,6 +82,7 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
     ## Arguments
 
     An `EnvConfig`, or its attributes as keyword arguments; and the fields of `PhysicsParams`, such as ``friction=0.5``.
+    With ``privileged=True`` its expert is told of them, and looks as far ahead as the actions are delayed.
     Faults of the readings are given together, ``sensors={"encoder_offset": 0.03, "delay_s": 0.01}``.
 
     ## Version history
@@ -152,7 +154,7 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
         state = self.state
         observation = self._observe(self._episode, state, self._simulation.read())
         if self._expert is not None:
-            self._expert.reset(self._episode.state_source.estimate(state))
+            self._expert.reset(self.estimated_state)
         if self.render_mode == "human":
             self.render()
         return observation, self._episode.info(state, {}, "")
@@ -253,8 +255,16 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
 
     @property
     def estimated_state(self) -> RobotState:
-        """All that an expert may read, now: `state`, with `estimator_noise` or as the `state_estimator` has it."""
-        return self._running("estimated_state").state_source.estimate(self.state)
+        """All that an expert may read, now: `state`, with `estimator_noise` or as the `state_estimator` has it.
+
+        In a privileged environment it tells how the robot differs from the model, and is the state in which an action
+        chosen now will take effect.
+        """
+        episode = self._running("estimated_state")
+        if not self.config.privileged:
+            return episode.state_source.estimate(self.state)
+        told = privileged_state(self._simulation, episode, PHYSICS_HZ // self.control_hz)
+        return episode.state_source.estimate(told)
 
     def expert_action(self) -> np.ndarray:
         """The expert's action for the `estimated_state`, float32, shape (12,). Changes nothing, here or later.

@@ -1,5 +1,6 @@
 """One episode: how it begins, what it carries from step to step, and when it is over."""
 
+import copy
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -103,14 +104,32 @@ class Episode:
             action: that was applied meanwhile, in [-1, 1], shape (12,).
             control_s: the period [s].
         """
-        before, mark = self.phase, self.task.gait.change_phase
-        self.phase = next_phase(self.task.gait, before, self.filtered_command, control_s)
-        if self.next_task is not None and (mark is None or before == self.phase or passes(mark, before, self.phase)):
-            self.change_task(self.next_task, 0.0)
-        self.filtered_command = filtered(self.command, self.filtered_command, control_s)
+        self._pass(control_s)
         self.last_action = action
         self.steps += 1
         self.time_s = self.steps * control_s
+
+    def _pass(self, seconds: float) -> None:
+        """Clock, task and command filter after some time, at most a control period."""
+        before, mark = self.phase, self.task.gait.change_phase
+        self.phase = next_phase(self.task.gait, before, self.filtered_command, seconds)
+        if self.next_task is not None and (mark is None or before == self.phase or passes(mark, before, self.phase)):
+            self.change_task(self.next_task, 0.0)
+        self.filtered_command = filtered(self.command, self.filtered_command, seconds)
+
+    def ahead(self, physics_steps: int, period: int) -> "Episode":
+        """The episode some time later, if nobody asks for anything else; this one stays as it is.
+
+        Args:
+            physics_steps: how much later.
+            period: physics steps per control period.
+        """
+        later = copy.copy(self)  # whatever changes is replaced, not written to
+        whole, rest = divmod(physics_steps, period)
+        for steps in [period] * whole + [rest] * bool(rest):
+            later._pass(steps / PHYSICS_HZ)
+        later.time_s = self.time_s + physics_steps / PHYSICS_HZ
+        return later
 
     def remember(self, frame: np.ndarray) -> None:
         """Take in the newest frame, shape (34,); the first one of an episode also stands for those before it."""

@@ -10,8 +10,6 @@ from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PHYSICS_HZ
 from go1_mtl_gym.validation import Limits, check_numbers
 
-PAYLOAD_SIDE = 0.1
-"""Side of the cube that the payload is [m]."""
 INERTIAL_ARRAYS = ("body_mass", "body_inertia", "dof_armature")
 """Those arrays of a model after whose change `mj_setConst` is due."""
 CHANGED_ARRAYS = (
@@ -40,7 +38,7 @@ _ALLOWED = {
 
 @dataclass(frozen=True)
 class PhysicsParams:
-    """What is different about the physics; the defaults change nothing. The expert is told none of it.
+    """What is different about the physics; the defaults change nothing. The expert of a privileged environment knows.
 
     Attributes:
         friction: coefficient of sliding friction between robot and ground, or None for the model's own.
@@ -96,7 +94,7 @@ class PhysicsParams:
             model.geom_friction[:, 0] = self.friction
         trunk = model.body("trunk").id
         model.body_mass[trunk] += self.payload_kg
-        model.body_inertia[trunk] += self.payload_kg * PAYLOAD_SIDE**2 / 6
+        model.body_inertia[trunk] += self.payload_kg * robot.PAYLOAD_SIDE**2 / 6
         for array in (model.actuator_gainprm, model.actuator_biasprm, model.actuator_forcerange):
             array *= self.motor_strength
         if self.joint_friction is not None:
@@ -137,5 +135,14 @@ class ActionDelay:
             return [(target, physics_steps)]
         line = np.vstack([self.waiting, np.tile(target, (physics_steps, 1))])
         now, self.waiting = np.split(line, [physics_steps])
-        starts = np.r_[0, 1 + np.flatnonzero((np.diff(now, axis=0) != 0).any(axis=1)), physics_steps]
-        return [(now[start], int(end - start)) for start, end in zip(starts[:-1], starts[1:])]
+        return _runs(now)
+
+    def pending(self) -> list[tuple[np.ndarray, int]]:
+        """What the actuators will hold until a target that is commanded now takes effect, as of `send`."""
+        return _runs(self.waiting) if len(self.waiting) else []
+
+
+def _runs(line: np.ndarray) -> list[tuple[np.ndarray, int]]:
+    """Equal neighbors among targets, shape (steps, 12), together: each target, and how often it stands there."""
+    starts = np.r_[0, 1 + np.flatnonzero((np.diff(line, axis=0) != 0).any(axis=1)), len(line)]
+    return [(line[start], int(end - start)) for start, end in zip(starts[:-1], starts[1:])]

@@ -1,5 +1,7 @@
 """The robot in MuJoCo: stepping, reading and writing its state. Knows nothing of tasks, gaits or rewards."""
 
+import copy
+
 import mujoco
 import numpy as np
 
@@ -33,6 +35,7 @@ class Simulation:
         """Load the model; the robot's state is whatever the file says until `reset`."""
         self.model = mujoco.MjModel.from_xml_path(robot.SCENE_PATH)
         self.data = mujoco.MjData(self.model)
+        self._scratch: mujoco.MjData | None = None
         self.model.opt.timestep = 1.0 / PHYSICS_HZ
         self.model.actuator_gainprm[:, 0] = gains.kp
         self.model.actuator_biasprm[:, 1] = -gains.kp
@@ -117,9 +120,31 @@ class Simulation:
             self.data.time = 0.0
 
     def _hold(self, target: np.ndarray, physics_steps: int) -> None:
-        for held, steps in self._delay.send(target, physics_steps):
+        self._run(self._delay.send(target, physics_steps))
+
+    def _run(self, targets: list[tuple[np.ndarray, int]]) -> None:
+        for held, steps in targets:
             self.data.ctrl[:] = held
             mujoco.mj_step(self.model, self.data, nstep=steps)
+
+    def ahead(self) -> "Simulation":
+        """The simulation at the time when a target that is commanded now will take effect.
+
+        It shares the model with this one, which stays as it is; the next call overwrites it. Without a delay it is this
+        one.
+        """
+        pending = self._delay.pending()
+        if not pending:
+            return self
+        if self._scratch is None:  # to make it takes as long as the steps
+            self._scratch = mujoco.MjData(self.model)
+        later = copy.copy(self)
+        later.data = self._scratch
+        mujoco.mj_setState(self.model, later.data, self._integration_state(), _STATE)
+        later._delay = ActionDelay(0)
+        later._run(pending)
+        mujoco.mj_forward(self.model, later.data)
+        return later
 
     def push(self, delta_velocity_w: np.ndarray) -> None:
         """Add to the trunk's linear velocity [m/s], world frame, shape (3,), at once."""
@@ -152,6 +177,28 @@ class Simulation:
         return self.data.sensordata[self._touch] > CONTACT_FORCE
 
     @property
+    def joint_resistance(self) -> tuple[float, float]:
+        """Mean dry friction [N m] and mean damping [N m s/rad] of the joints, beyond those of the model on disk."""
+        friction, damping = (
+            float((getattr(self.model, name)[6:] - self._plain[name][6:]).mean())
+            for name in ("dof_frictionloss", "dof_damping")
+        )
+        return friction, damping
+
+    @property
+    def foot_sink(self) -> float:
+        """How much deeper than the model's the feet of the standing robot sink into the ground [m], by estimate.
+
+        A contact of time constant T and impedance d whose point has the inverse inertia A yields r = d (1 - d) T^2 A f
+        to a force f (MuJoCo's documentation, "Solver parameters"), here a quarter of the weight.
+        """
+        body, d = self.model.geom_bodyid[self._foot_geom], self.model.geom_solimp[self._foot_geom, 1]
+        time, own = (array[self._foot_geom, 0] for array in (self.model.geom_solref, self._plain["geom_solref"]))
+        quarter = self.model.body_mass.sum() * robot.GRAVITY / 4
+        yielding = d * (1.0 - d) * self.model.body_invweight0[body, 0] * quarter
+        return max(float((yielding * (time**2 - own**2)).mean()), 0.0)
+
+    @property
     def stable(self) -> bool:
         """False once the physics has diverged (a non-finite or huge position, velocity or acceleration)."""
         warned = any(self.data.warning[kind].number for kind in _UNSTABLE)
@@ -171,9 +218,12 @@ class Simulation:
 
     def snapshot(self) -> np.ndarray:
         """Everything needed to continue to the bit, as one vector: state, targets on their way, physics_params."""
+        return np.concatenate([self._integration_state(), self._delay.waiting.ravel(), self.physics_params.as_vector()])
+
+    def _integration_state(self) -> np.ndarray:
         state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
         mujoco.mj_getState(self.model, self.data, state, _STATE)
-        return np.concatenate([state, self._delay.waiting.ravel(), self.physics_params.as_vector()])
+        return state
 
     def restore(self, snapshot: np.ndarray) -> None:
         """Return to a snapshot of a simulation with the same gains; its physics_params comes with it."""

@@ -8,7 +8,7 @@ from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PDGains
 from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.sim.physics_params import PAYLOAD_SIDE, ActionDelay, PhysicsParams
+from go1_mtl_gym.sim.physics_params import ActionDelay, PhysicsParams
 from go1_mtl_gym.sim.simulation import Simulation
 
 
@@ -68,7 +68,7 @@ def test_a_payload_adds_its_mass_and_the_inertia_of_a_cube_to_the_trunk():
     mass, inertia = loaded.body_mass - plain.body_mass, loaded.body_inertia - plain.body_inertia
     assert loaded.body_mass.sum() == pytest.approx(robot.MASS + 3.0) and mass[trunk] == pytest.approx(3.0)
     np.testing.assert_allclose(inertia[trunk], 3.0 * 0.1**2 / 6)  # m s^2 / 6 = .005 kg m^2
-    assert PAYLOAD_SIDE == 0.1
+    assert robot.PAYLOAD_SIDE == 0.1
     assert not np.delete(mass, trunk).any() and not np.delete(inertia, trunk, axis=0).any()
 
 

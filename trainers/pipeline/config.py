@@ -184,8 +184,11 @@ class JobConfig:
 
     @staticmethod
     def randomization_kwargs(fraction: float) -> dict[str, Any]:
-        """What environments have on top of `env_kwargs` if a fraction of their episodes is randomized."""
-        return {"randomization": DomainRandomization(fraction=fraction)} if fraction else {}
+        """What environments have on top of `env_kwargs` if a fraction of their episodes is randomized.
+
+        Their expert is told what was drawn; the student must find out.
+        """
+        return {"randomization": DomainRandomization(fraction=fraction), "privileged": True} if fraction else {}
 
     def perturbation(self, noise_rad: float, hard_push_interval: float | None = None) -> PerturbationConfig:
         """How an episode is perturbed.
