@@ -67,7 +67,7 @@ class JobConfig:
         mirror: whether to learn from the mirror image of every row too.
         shard_s: length of a shard, which begins with a standing start.
         dagger_s: recorded in each DAgger round.
-        takeover_rad: of the DAgger rounds, see `trainers.DAggerConfig`.
+        takeover_rad, round_weight: of the DAgger rounds, see `trainers.DAggerConfig`.
         width: units of each hidden layer.
         normalization: of inputs and outputs, see `trainers.MultiHeadPolicy`.
         batch_size: rows per gradient step.
@@ -109,7 +109,8 @@ class JobConfig:
     mirror: bool = True
     shard_s: float = _from(0, 15.0, above=True)
     dagger_s: float = _from(0, 60.0, above=True)
-    takeover_rad: float | None = _from(0, None, above=True)
+    takeover_rad: float | None = _from(0, 0.2, above=True)
+    round_weight: int = _from(1, 2)
     width: int = _from(1, 256)
     normalization: str = "mean_std"
     batch_size: int = _from(1, 1024)
@@ -252,7 +253,12 @@ class JobConfig:
     @property
     def dagger(self) -> DAggerConfig:
         """How to collect a DAgger round."""
-        return DAggerConfig(seconds_per_task=self.dagger_s, takeover_rad=self.takeover_rad, seed=self.seed)
+        return DAggerConfig(
+            seconds_per_task=self.dagger_s,
+            takeover_rad=self.takeover_rad,
+            round_weight=self.round_weight,
+            seed=self.seed,
+        )
 
     @property
     def phase(self) -> PhaseConfig:
@@ -266,7 +272,7 @@ class JobConfig:
 
 def _number(value: Any, field: "dataclasses.Field[Any]") -> int | float | None:
     """A field's value as Python's own number, checked against the field's lower bound."""
-    if value is None and field.default is None:
+    if value is None and "None" in str(field.type):
         return None
     low, above = field.metadata["low"], field.metadata["above"]
     kind = "an integer" if field.type is int else "a number"

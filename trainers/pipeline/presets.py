@@ -27,6 +27,19 @@ PRESETS: dict[str, dict[str, Any]] = {
         "round_episodes": 1,
         "video_s": 1.0,
     },
+    "shipped": {
+        "clean_s": 30.0,
+        "perturbed_s": 600.0,
+        "hard_push_s": 210.0,
+        "randomized_s": 420.0,
+        "held_out_s": 30.0,
+        "rounds": 4,
+        "dagger_s": 120.0,
+        "clone_steps": 12_000,
+        "round_steps": 5000,
+        "phase_free_s": 480.0,
+        "phase_free_steps": 8000,
+    },
     # arXiv 2505.08574: 20 commands of 30 s per gait at 1 kHz, clean; min-max scaling; 2560 units; no DAgger.
     "paper": {
         "tasks": PAPER_TASKS,
