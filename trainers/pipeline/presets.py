@@ -35,6 +35,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "held_out_s": 30.0,
         "rounds": 4,
         "dagger_s": 120.0,
+        "width": 384,
         "clone_steps": 12_000,
         "round_steps": 5000,
         "phase_free_s": 480.0,
