@@ -27,6 +27,10 @@ COMMAND_FILTER_S = 0.2
 """Time constant of the low-pass between a command and what expert and student see of it [s]."""
 COMMAND_SLEW = (4.0, 4.0, 8.0)
 """Largest change of the filtered command per second: vx, vy [m/s^2], yaw rate [rad/s^2]."""
+REACH = 1.15
+"""A gait may be begun with a filtered command that is larger than its largest by this factor."""
+SLACK_COMMAND = 0.02
+"""And by this much [m/s, rad/s], where the largest is about zero."""
 RESET_JOINT_NOISE = 0.03
 """Largest deviation of a joint from the home pose after a reset [rad]."""
 FALLEN_HEIGHT = 0.14
@@ -113,7 +117,8 @@ class Episode:
         """Clock, task and command filter after some time, at most a control period."""
         before, mark = self.phase, self.task.gait.change_phase
         self.phase = next_phase(self.task.gait, before, self.filtered_command, seconds)
-        if self.next_task is not None and (mark is None or before == self.phase or passes(mark, before, self.phase)):
+        leaves = mark is None or before == self.phase or passes(mark, before, self.phase)
+        if self.next_task is not None and leaves and self.is_slow_enough_for(self.next_task):
             self.change_task(self.next_task, 0.0)
         self.filtered_command = filtered(self.command, self.filtered_command, seconds)
 
@@ -154,12 +159,23 @@ class Episode:
         """Ask for another (vx [m/s], vy [m/s], yaw rate [rad/s]), shape (3,)."""
         self.command = command
 
+    def is_slow_enough_for(self, task: Task) -> bool:
+        """Whether the filtered command is one that a task can be begun with.
+
+        That is one within the task's `command_range`, or what is asked of it, and a seventh more: the filter comes near
+        a command soon, and never to it.
+        """
+        reach = np.maximum(task.command_range, np.abs(self.command))
+        return bool((np.abs(self.filtered_command) <= REACH * reach + SLACK_COMMAND).all())
+
     def change_task(self, task: Task, phase: float | None) -> None:
         """Change the task: at once to a phase, or with None to phase 0 as soon as the present gait can be left.
 
-        With None, a task that is present already goes on as it is.
+        With None, a task that is present already goes on as it is, and a robot that is too fast for the new task brakes
+        in the present one.
         """
-        if phase is not None or (task != self.task and self.task.gait.change_phase is None):
+        at_once = task != self.task and self.task.gait.change_phase is None and self.is_slow_enough_for(task)
+        if phase is not None or at_once:
             self.task, self.phase, self.next_task = task, phase or 0.0, None
         else:
             self.next_task = None if task == self.task else task
