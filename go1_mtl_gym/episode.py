@@ -25,7 +25,7 @@ from go1_mtl_gym.tasks import TASKS, Task
 
 COMMAND_FILTER_S = 0.2
 """Time constant of the low-pass between a command and what expert and student see of it [s]."""
-COMMAND_SLEW = (4.0, 4.0, 8.0)
+COMMAND_SLEW = (3.0, 3.0, 6.0)
 """Largest change of the filtered command per second: vx, vy [m/s^2], yaw rate [rad/s^2]."""
 REACH = 1.15
 """A gait may be begun with a filtered command that is larger than its largest by this factor."""
@@ -158,6 +158,13 @@ class Episode:
     def change_command(self, command: np.ndarray) -> None:
         """Ask for another (vx [m/s], vy [m/s], yaw rate [rad/s]), shape (3,)."""
         self.command = command
+
+    def _followed_command(self) -> np.ndarray:
+        """What the filter follows: the command; while a task waits to be begun, only as far as both tasks go."""
+        if self.next_task is None:
+            return self.command
+        span = np.minimum(self.task.command_range, np.maximum(self.next_task.command_range, np.abs(self.command)))
+        return np.clip(self.command, -span, span)
 
     def is_slow_enough_for(self, task: Task) -> bool:
         """Whether the filtered command is one that a task can be begun with.

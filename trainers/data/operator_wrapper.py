@@ -98,8 +98,10 @@ class OperatorWrapper(gymnasium.Wrapper):
         env.push([size * np.cos(angle), size * np.sin(angle), 0.0])
 
     def _change_task(self, task: str) -> None:
-        """Press a button; a command that the new task does not know is brought to its border first."""
-        env, limit = self._go1, np.array(TASKS[task].command_limit)
-        within = np.minimum(limit, env.requested_task.command_limit)
-        env.set_command(np.clip(env.command, -within, within))
+        """Press a button; a command beyond the new task's reach is brought to its border first."""
+        env = self._go1
+        reach = np.minimum(
+            self.operator.deflection * np.array(TASKS[task].command_range), env.requested_task.command_limit
+        )
+        env.set_command(np.clip(env.command, -reach, reach))
         env.set_task(task)
