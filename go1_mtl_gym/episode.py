@@ -160,11 +160,11 @@ class Episode:
         self.command = command
 
     def _followed_command(self) -> np.ndarray:
-        """What the filter follows: the command; while a task waits to be begun, only as far as both tasks go."""
+        """What the filter follows: the command; while a task waits to be begun, as far as the present one goes."""
         if self.next_task is None:
             return self.command
-        span = np.minimum(self.task.command_range, np.maximum(self.next_task.command_range, np.abs(self.command)))
-        return np.clip(self.command, -span, span)
+        reach = np.array(self.task.command_range)
+        return np.clip(self.command, -reach, reach)
 
     def is_slow_enough_for(self, task: Task) -> bool:
         """Whether the filtered command is one that a task can be begun with.

@@ -1,13 +1,14 @@
 """The command filter, worked by hand, and the course of an episode: its clock, its stands, its changes of task."""
 
 import dataclasses
+from collections import deque
 
 import numpy as np
 import pytest
 
 from go1_mtl_gym import GAITS, TASKS, InvalidInputError, robot
 from go1_mtl_gym.env import Go1Env
-from go1_mtl_gym.episode import COMMAND_SLEW, filtered
+from go1_mtl_gym.episode import COMMAND_SLEW, REACH, SLACK_COMMAND, Episode, filtered
 from go1_mtl_gym.gaits import STAND_COMMAND
 
 STILL = np.zeros(3)
@@ -18,12 +19,12 @@ def home(env: Go1Env) -> np.ndarray:
 
 
 def test_the_filter_by_hand():
-    assert COMMAND_SLEW == (4.0, 4.0, 8.0)
+    assert COMMAND_SLEW == (3.0, 3.0, 6.0)
     fraction = 1 - np.exp(-0.1)  # .02 s of .2 s
     np.testing.assert_allclose(filtered(np.array([0.4, 0, 0]), STILL, 0.02), [0.4 * fraction, 0, 0])
-    # 2 m/s would be followed by .19 m/s in .02 s; the limit is 4 x .02 = .08. Likewise 2 rad/s: .19 becomes .16.
-    np.testing.assert_allclose(filtered(np.array([2.0, -2.0, -2.0]), STILL, 0.02), [0.08, -0.08, -0.16])
-    np.testing.assert_allclose(filtered(STILL, np.array([1.0, 0.1, 0.0]), 0.02), [0.92, 0.1 - 0.1 * fraction, 0.0])
+    # 2 m/s would be followed by .19 m/s in .02 s; the limit is 3 x .02 = .06. Likewise 2 rad/s: .19 becomes .12.
+    np.testing.assert_allclose(filtered(np.array([2.0, -2.0, -2.0]), STILL, 0.02), [0.06, -0.06, -0.12])
+    np.testing.assert_allclose(filtered(STILL, np.array([1.0, 0.1, 0.0]), 0.02), [0.94, 0.1 - 0.1 * fraction, 0.0])
 
 
 @pytest.mark.parametrize("seconds", [0.001, 0.005, 0.02])
@@ -32,7 +33,7 @@ def test_the_filter_never_exceeds_its_slope_and_arrives(seconds):
     for _ in range(round(3.0 / seconds)):
         seen.append(filtered(command, seen[-1], seconds))
     slopes = np.abs(np.diff(seen, axis=0)) / seconds
-    assert (slopes <= np.array(COMMAND_SLEW) + 1e-9).all() and slopes[0].tolist() == pytest.approx([4.0, 4.0, 8.0])
+    assert (slopes <= np.array(COMMAND_SLEW) + 1e-9).all() and slopes[0].tolist() == pytest.approx([3.0, 3.0, 6.0])
     np.testing.assert_allclose(seen[-1], command, atol=1e-3)
 
 
@@ -173,3 +174,58 @@ def test_a_settled_episode_has_its_full_length_and_the_commands_of_any_other():
 def test_an_impossible_time_to_settle_is_refused(settle_s):
     with pytest.raises(InvalidInputError, match=rf"settle_s \[s\] must .*{settle_s}"):
         Go1Env(settle_s=settle_s)
+
+
+# -- Too fast for a gait -----------------------------------------------------------------------------------------------
+
+
+def running(task, command, filtered_command=None):
+    episode = Episode(TASKS[task], np.array(command), deque(maxlen=1))
+    episode.filtered_command = np.array(command if filtered_command is None else filtered_command)
+    return episode
+
+
+def test_a_robot_that_is_too_fast_for_a_gait_slows_down_before_it_changes():
+    limit = np.array(TASKS["walk"].command_range)
+    episode = running("trot", (1.6, 0.0, 0.0))
+    episode.change_command(np.array([limit[0], 0.0, 0.0]))
+    episode.change_task(TASKS["walk"], None)
+    assert episode.task.name == "trot" and episode.requested_task.name == "walk"
+    while episode.task.name == "trot":
+        before = episode.filtered_command[0]
+        assert episode.steps < 100
+        episode.advance(np.zeros(12), 0.02)
+    assert before > 1.1 * limit[0] and episode.filtered_command[0] <= REACH * limit[0] + SLACK_COMMAND
+    assert episode.phase == 0.0
+
+
+def test_a_robot_that_is_slow_enough_changes_at_once():
+    episode = running("trot", (0.5, 0.1, 0.0))
+    episode.change_task(TASKS["walk"], None)
+    assert episode.task.name == "walk" and episode.next_task is None
+
+
+def test_what_is_asked_of_a_gait_may_be_more_than_its_range():
+    beyond = TASKS["walk"].command_limit[0]
+    episode = running("trot", (beyond, 0.0, 0.0))
+    episode.change_task(TASKS["walk"], None)
+    assert episode.task.name == "walk"
+
+
+def test_a_phase_begins_a_gait_at_any_speed():
+    episode = running("trot", (0.3, 0.0, 0.0), (1.6, 0.0, 0.0))
+    episode.change_task(TASKS["walk"], 0.25)
+    assert episode.task.name == "walk" and episode.phase == 0.25
+
+
+def test_while_a_gait_waits_the_present_one_is_not_sent_beyond_its_range():
+    episode = running("jump", (0.0, 0.0, 0.0))
+    episode.phase = 0.5
+    episode.change_task(TASKS["bound"], None)
+    episode.change_command(np.array([TASKS["bound"].command_range[0], 0.0, 0.0]))
+    reached = []
+    while episode.task.name == "jump":
+        episode.advance(np.zeros(12), 0.02)
+        reached.append(episode.filtered_command[0])
+        assert len(reached) < 100
+    assert max(reached) <= TASKS["jump"].command_range[0]
