@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from go1_mtl_gym import Gait
-from trainers.evaluation.metrics import touchdowns, tracking_error, wilson_interval
+from trainers.evaluation.metrics import exact_interval, touchdowns, tracking_error
 from trainers.utils.files import json_ready
 
 SETTLE_S = 2.0
@@ -121,8 +121,8 @@ class ClosedLoopResult:
 
     @property
     def success_interval(self) -> tuple[float, float]:
-        """95 % Wilson interval of the success rate."""
-        return wilson_interval(sum(e.success for e in self.episodes), len(self.episodes))
+        """95 % interval (Clopper and Pearson's) of the success rate."""
+        return exact_interval(sum(e.success for e in self.episodes), len(self.episodes))
 
     def __str__(self) -> str:
         """One line for people; `repr` has every episode."""
