@@ -34,9 +34,9 @@ def run(arguments: Sequence[str] | None = None) -> None:
     render_mode = "human" if options.render else None
     env = policy.make_env(options.task, render_mode=render_mode)
     obs, info = env.reset(seed=0, options={"command": tuple(options.command)})
-    state, fallen = None, False
+    fallen = False
     for _ in range(round(options.seconds * env.unwrapped.control_hz)):
-        action, state = policy.predict(obs, state, deterministic=True)
+        action, _ = policy.predict(obs, deterministic=True)
         obs, _, fallen, truncated, info = env.step(action)
         if fallen or truncated:
             break

@@ -308,7 +308,7 @@ def test_the_phase_free_policy_is_the_policy_with_an_estimate_of_the_phase(smoke
     kept, given = phase_free.student.state_dict(), student.state_dict()
     assert kept.keys() == given.keys() and all(bool((kept[name] == given[name]).all()) for name in given)
     assert "phase" not in phase_free.env_kwargs["channels"] and phase_free.env_kwargs["history"] == 10
-    assert phase_free.correction == 1.0
+    assert phase_free.correction < 1
 
 
 @pytest.mark.slow

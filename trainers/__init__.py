@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from trainers.data.collection import CollectJob, ShardMismatchError, collect, collect_all, watch
     from trainers.data.demonstrations import Demonstrations
     from trainers.data.environments import PerturbationConfig, make_env, make_venv
+    from trainers.data.stateful import Learner
     from trainers.evaluation.closed_loop import evaluate
     from trainers.evaluation.figures import joint_target_figure
     from trainers.evaluation.gait_transitions import evaluate_transition
@@ -37,7 +38,6 @@ if TYPE_CHECKING:
     from trainers.policies.phase_estimator import PhaseEstimator, phase_errors
     from trainers.policies.phase_free import PhaseFreePolicy
     from trainers.policies.pretrained import load_pretrained
-    from trainers.policies.stateful import Learner
     from trainers.utils.logging import log_figure, log_round, log_text, make_logger
     from trainers.utils.report import paper_table, results_table
 
@@ -56,7 +56,7 @@ _HOME = {
     "ExpertPolicy": "policies.expert_policy",
     "Job": "pipeline.job",
     "JobConfig": "pipeline.config",
-    "Learner": "policies.stateful",
+    "Learner": "data.stateful",
     "MultiHeadPolicy": "policies.multi_head",
     "MultiTaskLoss": "algorithms.losses",
     "PerturbationConfig": "data.environments",

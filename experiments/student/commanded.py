@@ -10,7 +10,6 @@ from experiments.agents import EXPERT, PHASE_FREE, SHARED, STUDENT, Agent
 from experiments.results import Group, Results, group
 from experiments.stats import Rate
 from experiments.student.episodes import drawn
-from experiments.student.phase import with_correction
 from experiments.study import EVALUATION_CODE, Cell, Metrics, Study, option
 from experiments.tables import count, judged, markdown, number
 from experiments.training_runs import TrainedPolicy, TrainingRun, changed
@@ -73,10 +72,9 @@ class Commanded(Study):
 
     def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:
         options, policy = self.options, agent.load()
-        if cell.condition == CORRECTED:
-            policy = with_correction(policy, options.correction)
         episodes = options.corner_episodes if cell.condition == CORNERS else options.episodes
         if agent.name == PHASE_FREE:
+            policy = policy.with_correction(options.correction if cell.condition == CORRECTED else 1.0)
             episodes = options.phase_free_episodes
         corners = cell.condition == CORNERS
         return drawn(policy, cell.task, episodes, options, seed, corners=corners, **agent.env_kwargs)

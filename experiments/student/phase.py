@@ -79,7 +79,7 @@ def running_phase(policy: trainers.PhaseFreePolicy) -> Estimate:
     def estimate(rows: trainers.Demonstrations) -> np.ndarray:
         seen, clocks = _seen(rows, policy), []
         for episode in seen.episodes():
-            state: Any = None
+            state = policy.initial_state()
             for obs in seen.obs[episode]:
                 _, state = policy.predict(obs[None], state, deterministic=True)
                 clocks.append(state[0][0])
@@ -108,11 +108,3 @@ def phase_error(estimate: Estimate, rows: trainers.Demonstrations) -> dict[str, 
     """
     error = phase_distance(estimate(rows), phase_of(rows))
     return {"median": float(np.median(error)), "p99": float(np.quantile(error, 0.99))}
-
-
-def with_correction(policy: trainers.PhaseFreePolicy, correction: float) -> trainers.PhaseFreePolicy:
-    """The same policy and estimator in the same world, with another correction of the clock."""
-    other = trainers.PhaseFreePolicy(policy.student, policy.estimator, correction)
-    other.extra_env_kwargs = policy.extra_env_kwargs
-    other.set_training_mode(False)
-    return other

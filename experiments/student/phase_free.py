@@ -19,7 +19,6 @@ from experiments.student.phase import (
     phase_error,
     phase_of,
     running_phase,
-    with_correction,
     without_asked,
 )
 from experiments.student.transitions import TransitionOptions
@@ -164,7 +163,7 @@ class PhaseFree(Study):
         if agent.name in VARIANTS:
             episodes, (policy, estimate) = options.job.episodes, Trainings(options, self.folder).policy(agent.name)
         else:
-            policy = with_correction(agent.load(), float(agent.name.split()[-1]))
+            policy = agent.load().with_correction(float(agent.name.split()[-1]))
             episodes, estimate = options.given_episodes, running_phase(policy)
         records = walk(policy, options, episodes, seed)
         if estimate is not None:
@@ -233,7 +232,7 @@ class Trainings:
         """A variant, and what gives its estimate of the phase if it has one."""
         variant = VARIANTS[name]
         if variant.correction is not None:
-            policy = with_correction(self._kept("two stages", self._two_stages), variant.correction)
+            policy = self._kept("two stages", self._two_stages).with_correction(variant.correction)
             return policy, running_phase(policy)
         policy = self._kept(name, lambda: self._one_network(variant))
         return (without_asked(policy), asked_phase(policy)) if variant.asked else (policy, None)

@@ -338,5 +338,5 @@ def test_finished_policies_are_measured_with_each_correction_and_others_refused(
     assert [agent.name for agent in study.agents()][-2:] == ["phase_free, correction 1", "phase_free, correction 0.2"]
     with pytest.raises(InvalidInputError, match="PhaseFreePolicy"):
         dataclasses.replace(study, policies=(shipped("clocked", "clocked"),)).agents()
-    policy = phase.with_correction(shipped("a", "phase_free").load(), 0.3)
+    policy = shipped("a", "phase_free").load().with_correction(0.3)
     assert policy.correction == 0.3 and Agent("a").load() == "a"

@@ -19,10 +19,10 @@ from trainers.algorithms.dagger_collector import BlockCollector
 from trainers.data.collection import ShardMismatchError
 from trainers.data.demonstrations import Demonstrations
 from trainers.data.environments import contracts_of, derive_seed, flat_obs, settings_of
+from trainers.data.stateful import Learner
 from trainers.policies.checkpoint import fingerprint
 from trainers.policies.expert_policy import ExpertPolicy
 from trainers.policies.multi_head import MultiHeadPolicy
-from trainers.policies.stateful import Learner
 from trainers.utils.files import json_ready, write_json
 from trainers.utils.logging import make_logger
 

@@ -10,7 +10,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
 from trainers.data.collection import BEFORE_FALL_S
 from trainers.data.environments import flat_obs
-from trainers.policies.stateful import Learner
+from trainers.data.stateful import Learner
 
 
 class StarvedCollectorError(Go1Error):

@@ -16,7 +16,7 @@ from trainers.data.environments import EnvFactory, PerturbationConfig, derive_se
 from trainers.policies import normalization as norm
 from trainers.policies.multi_head import MultiHeadPolicy
 from trainers.policies.phase_estimator import PhaseEstimator, inputs_and_phase
-from trainers.policies.phase_free import PhaseFreePolicy, phase_free_layout
+from trainers.policies.phase_free import CORRECTION, PhaseFreePolicy, phase_free_layout
 
 
 @dataclasses.dataclass(frozen=True)
@@ -86,7 +86,7 @@ def train_phase_free(
     seconds: float = 240.0,
     history: int = 10,
     *,
-    correction: float = 1.0,
+    correction: float = CORRECTION,
     perturbation: PerturbationConfig | None = None,
     config: PhaseConfig | None = None,
     seed: int = 0,
@@ -100,7 +100,7 @@ def train_phase_free(
         student: a trained one.
         seconds: watched per task [s].
         history: frames of proprioception that the estimator reads.
-        correction: of the policy that is returned.
+        correction: of the policy that is returned; see `PhaseFreePolicy`.
         perturbation: of the walks; None is the default `PerturbationConfig`.
         config: how to train the estimator.
         seed: of the walks and of the initial weights.

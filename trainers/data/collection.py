@@ -20,6 +20,7 @@ from go1_mtl_gym.sensing.observation import ObservationLayout
 from go1_mtl_gym.validation import finite_vector, integer_in
 from trainers.data.demonstrations import Demonstrations
 from trainers.data.environments import EnvFactory, PerturbationConfig, WithTasks, base_env, derive_seed, make_env
+from trainers.data.stateful import Learner
 from trainers.utils.files import json_form
 from trainers.utils.processes import keep_interrupts
 from trainers.utils.validation import positive
@@ -120,7 +121,7 @@ def collect(
         perturbation = dataclasses.replace(perturbation, command_interval=None)
     env = make_env(task, perturbation, **{"episode_s": EPISODE_S, **job.env_kwargs})
     try:
-        rows = _record(env, job, lambda obs: base_env(env).expert_action())
+        rows = _record(env, job, lambda obs, begins: base_env(env).expert_action())
         return dataclasses.replace(rows, meta=rows.meta | {"factory": _name_of(make_env)})
     finally:
         env.close()
@@ -137,10 +138,11 @@ def watch(
     make_env: EnvFactory = make_env,
     **env_kwargs: Any,
 ) -> Demonstrations:
-    """Let a policy without a state drive, and record what it did; no expert is asked.
+    """Let a policy drive, and record what it did; no expert is asked.
 
     Args:
-        policy: with ``predict(obs, deterministic=True)``, `env_kwargs` and `contract`, of one frame of proprioception.
+        policy: with ``predict(obs, deterministic=True)``, `env_kwargs` and `contract`, of one frame of proprioception;
+            a `Learner` keeps its state, if it has one.
         task: name of the task that every episode begins in.
         seed: of everything random.
         seconds: duration of the kept rows [s].
@@ -163,14 +165,14 @@ def watch(
         layout = contract.layout
         newest = ObservationLayout(contract.tasks, contract.channels)
         policy.contract.check(contract.with_terms(terms_of(newest)), "the policy", "the environment")
-        columns = layout.columns(newest)
-        return _record(env, job, lambda obs: policy.predict(obs[columns], deterministic=True)[0])
+        columns, learner = layout.columns(newest), Learner(policy)
+        return _record(env, job, lambda obs, begins: learner.act(obs[columns], np.array([begins])))
     finally:
         env.close()
 
 
-def _record(env: gymnasium.Env, job: CollectJob, act: Callable[[np.ndarray], np.ndarray]) -> Demonstrations:
-    """The rows of a job: what was seen, and what `act` made of it; it also drives."""
+def _record(env: gymnasium.Env, job: CollectJob, act: Callable[[np.ndarray, bool], np.ndarray]) -> Demonstrations:
+    """The rows of a job: what was seen, and what `act` made of it; it also drives, and is told of each beginning."""
     base = base_env(env)
     wanted = round(job.seconds * base.control_hz)
     obs_rows: list[np.ndarray] = []
@@ -183,9 +185,9 @@ def _record(env: gymnasium.Env, job: CollectJob, act: Callable[[np.ndarray], np.
         starts.append(len(obs_rows))
         options = {} if job.command is None else {"command": job.command}
         obs, _ = env.reset(seed=derive_seed("collect", job.task, job.seed, episode), options=options)
-        ended = False
+        begins, ended = True, False
         while not ended and len(obs_rows) < wanted:
-            label = act(obs)
+            label, begins = act(obs, begins), False
             obs_rows.append(obs)
             act_rows.append(label)
             obs, _, terminated, truncated, _ = env.step(label)

@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from go1_mtl_gym.errors import InvalidInputError
 from trainers.data.demonstrations import Demonstrations
+from trainers.data.stateful import act_on_rows
 
 if TYPE_CHECKING:
     from stable_baselines3.common.policies import BasePolicy
@@ -23,7 +24,8 @@ def joint_target_figure(
     """Predicted against expert joint targets, a row per task and a column per joint of the front left leg.
 
     Args:
-        policy: anything with ``predict(obs, deterministic=True)`` on batches.
+        policy: anything with ``predict(obs, deterministic=True)`` on batches; each row is asked for by itself, as in
+            `trainers.offline_metrics`.
         demonstrations: held-out rows, or task -> rows; of each task the last `seconds` of its first episode are shown.
         seconds: how much is shown [s].
 
@@ -42,7 +44,7 @@ def joint_target_figure(
         episode = next(rows.episodes())
         shown = slice(max(episode.start, episode.stop - round(seconds * rows.control_hz)), episode.stop)
         time = np.arange(shown.stop - shown.start) / rows.control_hz
-        predicted = rows.contract.to_radians(policy.predict(rows.obs[shown], deterministic=True)[0])
+        predicted = rows.contract.to_radians(act_on_rows(policy, rows.obs[shown]))
         expert = rows.contract.to_radians(rows.acts[shown])
         for column, (joint, index) in enumerate(JOINTS.items()):
             ax = axes[row, column]

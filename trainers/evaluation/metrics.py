@@ -8,6 +8,7 @@ from scipy import stats
 
 from go1_mtl_gym.errors import InvalidInputError
 from trainers.data.demonstrations import Demonstrations
+from trainers.data.stateful import act_on_rows
 
 if TYPE_CHECKING:
     from stable_baselines3.common.policies import BasePolicy
@@ -22,7 +23,8 @@ def offline_metrics(
 
     Args:
         policy: anything with ``predict(obs, deterministic=True) -> (acts, state)`` on batches; where it has a
-            `contract`, the rows are brought into its order of tasks.
+            `contract`, the rows are brought into its order of tasks. Each row is asked for by itself: a
+            `trainers.PhaseFreePolicy` goes by its estimate of the phase alone.
         demonstrations: held-out rows.
         half_range: radians per unit of action, shape (12,); None takes the demonstrations' own.
 
@@ -37,7 +39,7 @@ def offline_metrics(
     scores = {}
     for name, rows in demonstrations.per_task().items():
         chunks = range(0, len(rows), BATCH)
-        predicted = np.concatenate([policy.predict(rows.obs[i : i + BATCH], deterministic=True)[0] for i in chunks])
+        predicted = np.concatenate([act_on_rows(policy, rows.obs[i : i + BATCH]) for i in chunks])
         scores[name] = regression_metrics(scale * predicted, scale * rows.acts)
     return scores
 

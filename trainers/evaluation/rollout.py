@@ -15,8 +15,8 @@ from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.expert import check_expert_fits
 from go1_mtl_gym.validation import finite_vector
 from trainers.data.environments import EnvFactory, Go1Like, WithTasks, base_env
+from trainers.data.stateful import Learner
 from trainers.evaluation.scoring import Series
-from trainers.policies.stateful import Learner
 from trainers.utils.processes import keep_interrupts
 
 
