@@ -33,7 +33,10 @@ class Series:
         contacts: feet on the ground, bool, shape (n, 4).
         running: whether the gait clock ran during the step, bool, shape (n,).
         gaits: that the clock was of, after each step.
+        commands: as asked for, shape (n, 3).
+        tasks: names of the tasks, after each step.
         moves: what the hands were doing, if there are any; empty otherwise.
+        events: what they did in each step besides: "push", or the name of a task; empty without hands.
     """
 
     measured: np.ndarray
@@ -41,7 +44,10 @@ class Series:
     contacts: np.ndarray
     running: np.ndarray
     gaits: tuple[Gait, ...]
+    commands: np.ndarray
+    tasks: tuple[str, ...]
     moves: tuple[str, ...] = ()
+    events: tuple[tuple[str, ...], ...] = ()
 
 
 @dataclasses.dataclass(frozen=True)
