@@ -1,5 +1,6 @@
 """Everything that an environment can be asked for, as one immutable, validated value."""
 
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any
@@ -57,6 +58,7 @@ class EnvConfig:
         render_mode: None, "human" or "rgb_array".
         width, height: of the picture [pixels].
         physics: differences from the expert's model.
+        robot: path of an MJCF file of another Go1, or None for ours; the experts go on thinking of ours.
 
     Raises:
         InvalidInputError: if something is not as described.
@@ -79,6 +81,7 @@ class EnvConfig:
     width: int = 640
     height: int = 480
     physics: PhysicsParams = field(default_factory=PhysicsParams)
+    robot: str | None = None
 
     def __post_init__(self) -> None:
         """Check everything, and bring it into its one form."""
@@ -101,6 +104,7 @@ class EnvConfig:
             width=integer_in(self.width, *PIXELS, "width [pixels]"),
             height=integer_in(self.height, *PIXELS, "height [pixels]"),
             physics=parameters_of(self.physics, PhysicsParams, "physics"),
+            robot=_path(self.robot),
         )
         self._check_together()
 
@@ -217,6 +221,19 @@ def check_control_hz(control_hz: object) -> int:
     if rate % 1 or PHYSICS_HZ % rate:
         raise InvalidInputError(f"control_hz must be an integer that divides {PHYSICS_HZ}, got {control_hz}")
     return int(rate)
+
+
+def _path(value: object) -> str | None:
+    """Return the path of a robot's file; None stays None.
+
+    Raises:
+        InvalidInputError: if there is no such file.
+    """
+    if value is None:
+        return None
+    if not isinstance(value, (str, os.PathLike)) or not os.path.isfile(value):
+        raise InvalidInputError(f"robot must be the path of an MJCF file or None, got {value!r}")
+    return os.fspath(value)
 
 
 def _names(kind: type) -> tuple[str, ...]:
