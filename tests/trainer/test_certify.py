@@ -15,6 +15,7 @@ from trainers.__main__ import run
 from trainers.data.environments import ExpertAccess
 from trainers.evaluation.agents import identity
 from trainers.evaluation.conditions import CONDITIONS
+from trainers.evaluation.stopping import FEWEST
 
 
 class HandledEnv(StubEnv):
@@ -84,7 +85,7 @@ def test_a_policy_that_never_fails_stops_where_its_claim_is_met():
 
 def test_a_policy_that_often_fails_is_done_early_and_the_causes_are_told(fallen):
     for cell in fallen.cells:
-        assert cell.verdict == "refuted" and cell.trials < 20
+        assert cell.verdict == "refuted" and cell.trials == FEWEST
         assert cell.outcomes.count("f") == len(cell.failures) == cell.trials - cell.survived > 1
         assert {failure.cause.doing for failure in cell.failures} <= {"standing", "braking"}
         assert {failure.cause.what for failure in cell.failures} == {"fell"}

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from go1_mtl_gym.errors import InvalidInputError
-from trainers.evaluation.stopping import Plan
+from trainers.evaluation.stopping import FEWEST, Plan
 
 GOOD, BAD = True, False
 
@@ -58,10 +58,12 @@ def test_a_policy_that_never_fails_stops_at_the_first_look():
     assert plan.judge([BAD] * 2 + [GOOD] * 900)[0] != "met"
 
 
-def test_a_policy_that_always_fails_is_done_at_once_and_one_that_nearly_holds_is_not():
+def test_a_policy_that_often_fails_is_done_early_and_one_that_nearly_holds_is_not():
     plan = Plan.sequential(0.99, 0.95, 1)
-    # the likelihood ratio of n failures in a row, at 5 % against 1 %, is 5^n: 25 exceeds 20
-    assert plan.judge([BAD] * 9) == ("refuted", 2)
+    assert plan.judge([BAD] * 90) == ("refuted", FEWEST) and plan.judge([BAD] * 9) == ("", 9)
+    late = [GOOD] * 30 + [BAD] * 9
+    # 3 failures in 33 episodes: 125 (0.95 / 0.99)^30 = 36; 2 in 32: 7
+    assert plan.judge(late) == ("refuted", 33)
     rare = ([GOOD] * 99 + [BAD]) * 5
     assert plan.judge(rare) == ("open", plan.largest), "1 in 100 is neither shown nor refuted"
 

@@ -15,6 +15,8 @@ MET, REFUTED, OPEN = "met", "refuted", "open"
 """What is known of a claim in the end: it holds, it does not, or neither could be shown."""
 ALTERNATIVE = 5.0
 """A claim is tested against a policy that fails so many times as often as it allows."""
+FEWEST = 20
+"""Episodes before a claim can be refuted, so that the rate and the causes of the failures tell something."""
 MANY_FAILURES = 50
 """Largest number of failures that a plan can allow."""
 
@@ -31,8 +33,8 @@ class Plan:
     The claim is refuted when Wald's likelihood ratio of a policy that fails `ALTERNATIVE` times as often as the claim
     allows, against one that only just meets it, exceeds 1 / (1 - confidence); after a fixed number of episodes, when
     the exact one-sided upper bound is below the claim. For a policy that deserves the claim either happens with a
-    probability of 1 - confidence at most (the first whenever one looks, by Ville's inequality). A claim that can no
-    longer be met and is not refuted yet goes on to the largest number of episodes, and stays open then.
+    probability of 1 - confidence at most (the first whenever one looks, by Ville's inequality). It takes `FEWEST`
+    episodes. A claim that can no longer be met and is not refuted yet goes on to the largest number, and stays open.
 
     Attributes:
         claim: success rate that is claimed, in (0, 1).
@@ -122,7 +124,7 @@ class Plan:
         return min([*stops, self.largest])
 
     def _refuted(self, count: int, failures: int) -> bool:
-        if self.looks and failures <= self.looks[-1][1]:
+        if count < min(FEWEST, self.largest) or (self.looks and failures <= self.looks[-1][1]):
             return False
         if not self.early:
             return exact_interval(count - failures, count, 2.0 * self.confidence - 1.0)[1] < self.claim
