@@ -16,7 +16,14 @@ from trainers.policies.pretrained import FOLDER
 EXPERT, STUDENT, PHASE_FREE = "expert", "student", "phase-free student"
 SHARED = ("tasks", "control_hz", "kp", "kd")
 """Arguments of the policies' environments that the expert's has as well; the others shape what only policies see."""
-TRAINING_WORLD = ("randomization", "noise", *EXPERT_ONLY, *(each.name for each in fields(PhysicsParams)))
+TRAINING_WORLD = (
+    "randomization",
+    "noise",
+    "sensors",
+    "settle_s",
+    *EXPERT_ONLY,
+    *(each.name for each in fields(PhysicsParams)),
+)
 """Arguments in which the environment that a policy was trained in may differ; all are measured in the model's world."""
 
 

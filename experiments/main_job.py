@@ -11,7 +11,8 @@ from trainers.utils.report import paper_table, results_table
 
 NAME = "main_job"
 EXPERT, STUDENT = "expert", "multi_head"
-DERIVED = ("survival_rate", "success_rate", "success_interval", "episodes")
+RATES = {"survival_rate": "survived", "success_rate": "succeeded"}
+DERIVED = (*RATES, *(f"operator_{name}" for name in RATES), "success_interval", "episodes")
 
 
 def results_of(metrics: Mapping[str, Any], command: str) -> Results:
@@ -40,11 +41,11 @@ def results_of(metrics: Mapping[str, Any], command: str) -> Results:
 def _counted(scores: Mapping[str, Any]) -> dict[str, Any]:
     """Metrics with counts in place of the rates that follow from them."""
     trials = scores["episodes"]
-    counts = {
-        "trials": trials,
-        "survived": round(trials * scores["survival_rate"]),
-        "succeeded": round(trials * scores["success_rate"]),
-    }
+    counts = {"trials": trials}
+    for before in ("", "operator_"):
+        for rate, counted in RATES.items():
+            if before + rate in scores:
+                counts[before + counted] = round(trials * scores[before + rate])
     return {name: value for name, value in scores.items() if name not in DERIVED} | counts
 
 
@@ -83,9 +84,7 @@ def _by_task(results: Results) -> dict[str, dict[str, Any]]:
     """{task: {agent: metrics}} with rates."""
     tasks: dict[str, dict[str, Any]] = {}
     for record in results.records:
-        rates = {f"{name}_rate": record[key] / record["trials"] for name, key in _COUNTS.items()}
+        counted = {f"{before}{rate}": before + key for before in ("", "operator_") for rate, key in RATES.items()}
+        rates = {rate: record[key] / record["trials"] for rate, key in counted.items() if key in record}
         tasks.setdefault(record["task"], {})[record["agent"]] = record | rates | {"episodes": record["trials"]}
     return tasks
-
-
-_COUNTS = {"survival": "survived", "success": "succeeded"}

@@ -44,6 +44,7 @@ from experts.plausibility import plausible
 from experts.robot_model import Dynamics, RobotModel
 from experts.whole_body.inverse_dynamics import joint_torques
 from experts.whole_body.jacobian_transpose import jacobian_transpose_torques
+from experts.whole_body.joint_resistance import joint_resistance
 from experts.whole_body.qp import WholeBodyQP
 from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PDGains
@@ -164,7 +165,6 @@ class NMPCExpert:
         self._mpc = MPC(self.config.mpc)
         self._whole_body = WHOLE_BODY[self.config.whole_body]()
         self._recall = Recall()
-        self._standing_inertia = tuple(np.diag(self._model.standing_inertia()).tolist())
 
     def reset(self, state: RobotState) -> None:
         """Begin an episode: clear the counters and, with the options that have one, the memory."""
@@ -182,7 +182,8 @@ class NMPCExpert:
         half = self.hold_s / 2
         q = state.q + half * state.v + half**2 / 2 * acceleration
         v = state.v + half * acceleration
-        return self.gains.target(torque, q, v)
+        torque = torque + joint_resistance(state, v)
+        return self.gains.target(torque / state.motor_strength, q, v)
 
     def torque(self, state: RobotState) -> tuple[np.ndarray, np.ndarray]:
         """Joint torques [N m] within the limits and joint accelerations [rad/s^2], each of shape (12,)."""
@@ -240,7 +241,7 @@ class NMPCExpert:
         """Sequential quadratic programming from a trajectory, shapes (N + 1, 12) and (N, 12), to the next one."""
         config = self.config
         for _ in range(config.sqp_iterations):
-            model = linearize(states, inputs, horizon.feet, horizon.inertia_b, horizon.dt)
+            model = linearize(states, inputs, horizon.feet, horizon.inertia_b, horizon.dt, horizon.mass)
             solution = self._mpc.solve(model, horizon.x0, horizon.reference[1:], horizon.nominal, horizon.contact)
             self.counters.count(solution)
             if not solution.usable:
@@ -256,7 +257,9 @@ class NMPCExpert:
         """The nominal motion of the state's gait, or of standing."""
         if state.standing:
             return standing_motion(state.gait)
-        return nominal_motion(state.gait, self._standing_inertia, self.config.com_height - robot.FOOT_RADIUS)
+        inertia = self._model.standing_moments(state.payload_kg)
+        height = self.config.com_height - robot.FOOT_RADIUS
+        return nominal_motion(state.gait, inertia, height, robot.MASS + state.payload_kg)
 
 
 def mean_velocity(state: RobotState, dynamics: Dynamics, motion: NominalMotion) -> np.ndarray:
@@ -281,6 +284,6 @@ def _is_plausible(state: RobotState) -> bool:
         state.q,
         state.v,
         state.command,
-        (state.phase, state.time_s),
+        (state.phase, state.time_s, state.payload_kg, state.joint_friction, state.joint_damping),
     )
     return plausible(np.concatenate(numbers))

@@ -14,6 +14,9 @@ from experts.planning.plane import to_complex, turn
 from go1_mtl_gym import robot
 from go1_mtl_gym.sensing.state import RobotState
 
+_TRUNK = 1
+"""Index of the trunk's joint, the free-flyer; joint 0 is the universe."""
+
 
 @dataclass(frozen=True)
 class Dynamics:
@@ -30,6 +33,7 @@ class Dynamics:
         com_w: centre of mass, world [m], shape (3,).
         com_velocity_w: world [m/s], shape (3,).
         inertia_w: composite inertia about the centre of mass, world axes [kg m^2], shape (3, 3).
+        mass: of the whole robot, payload included [kg].
         mean_omega_w: angular velocity of the whole robot, trunk and legs: I^-1 times its angular momentum about the
             centre of mass, world [rad/s], shape (3,).
         lean_w: rotation of the whole robot against the trunk's, I^-1 A_joints (q - q_home), world [rad], shape (3,);
@@ -47,6 +51,7 @@ class Dynamics:
     com_w: np.ndarray
     com_velocity_w: np.ndarray
     inertia_w: np.ndarray
+    mass: float
     mean_omega_w: np.ndarray
     lean_w: np.ndarray
 
@@ -89,18 +94,42 @@ class RobotModel:
         self._damping = np.asarray(self.model.damping)
         self._no_acceleration = np.zeros(self.model.nv)
         self._upper = np.triu_indices(self.model.nv, 1)
+        self._trunk = self.model.inertias[_TRUNK].copy()
+        self._payload_kg = 0.0
+        self._standing_moments = _diagonal(self.standing_inertia())
 
     def __reduce__(self) -> tuple[type["RobotModel"], tuple[()]]:
         return type(self), ()
 
-    def standing_inertia(self) -> np.ndarray:
-        """Composite inertia about the centre of mass in the home pose, trunk axes [kg m^2], shape (3, 3)."""
+    def standing_inertia(self, payload_kg: float = 0.0) -> np.ndarray:
+        """Composite inertia about the centre of mass in the home pose, trunk axes [kg m^2], shape (3, 3).
+
+        Args:
+            payload_kg: mass that the trunk carries, as of `RobotState`.
+        """
+        self._carry(payload_kg)
         q = np.concatenate([np.zeros(6), [1.0], robot.HOME_POSE])
         pin.ccrba(self.model, self.data, q, self._no_acceleration)
         return self.data.Ig.inertia.copy()
 
+    def standing_moments(self, payload_kg: float = 0.0) -> tuple[float, float, float]:
+        """Ixx, Iyy, Izz of `standing_inertia`."""
+        self._carry(payload_kg)
+        return self._standing_moments
+
+    def _carry(self, payload_kg: float) -> None:
+        """Let the trunk have a cube of some mass fixed at its centre of mass."""
+        if payload_kg == self._payload_kg:
+            return
+        cube = payload_kg * robot.PAYLOAD_SIDE**2 / 6 * np.eye(3)
+        trunk = self._trunk
+        self.model.inertias[_TRUNK] = pin.Inertia(trunk.mass + payload_kg, trunk.lever, trunk.inertia + cube)
+        self._payload_kg = payload_kg
+        self._standing_moments = _diagonal(self.standing_inertia(payload_kg))
+
     def dynamics(self, state: RobotState) -> Dynamics:
         """Evaluate everything at one state."""
+        self._carry(state.payload_kg)
         model, data = self.model, self.data
         q, v = to_pinocchio(state)
         pin.computeAllTerms(model, data, q, v)
@@ -132,6 +161,12 @@ class RobotModel:
             com_w=data.com[0].copy(),
             com_velocity_w=data.vcom[0].copy(),
             inertia_w=inertia,
+            mass=robot.MASS + state.payload_kg,
             mean_omega_w=mean_omega,
             lean_w=lean,
         )
+
+
+def _diagonal(inertia: np.ndarray) -> tuple[float, float, float]:
+    xx, yy, zz = np.diag(inertia).tolist()
+    return xx, yy, zz

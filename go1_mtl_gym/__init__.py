@@ -17,6 +17,7 @@ from go1_mtl_gym.gaits import GAITS, Gait
 from go1_mtl_gym.registration import env_id, register_built_in, register_task
 from go1_mtl_gym.rewards import RewardWeights
 from go1_mtl_gym.sensing.observation import ObservationLayout, SensorNoise
+from go1_mtl_gym.sensing.sensor_faults import SensorParams
 from go1_mtl_gym.sensing.state import RobotState
 from go1_mtl_gym.sensing.state_estimator import StateEstimatorConfig
 from go1_mtl_gym.sensing.state_noise import EstimatorNoise
@@ -45,6 +46,7 @@ __all__ = [
     "RewardWeights",
     "RobotState",
     "SensorNoise",
+    "SensorParams",
     "StateEstimatorConfig",
     "Task",
     "env_id",

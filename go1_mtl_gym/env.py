@@ -19,7 +19,9 @@ from go1_mtl_gym.episode import Episode, begin_episode, how_it_ended
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.expert import Expert, make_expert
 from go1_mtl_gym.gaits import check_phase
+from go1_mtl_gym.privileged import privileged_state
 from go1_mtl_gym.registration import register_task
+from go1_mtl_gym.sensing.sensor_faults import Reading
 from go1_mtl_gym.sensing.state import RobotState
 from go1_mtl_gym.sensors import frame, measure, robot_state
 from go1_mtl_gym.sim.physics_params import PhysicsParams
@@ -70,8 +72,9 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
 
     ## Episodes
 
-    Start standing at phase 0 of the gait clock, joints within 0.03 rad of the home pose. Terminate on a fall (trunk
-    below 0.14 m, or tilted by more than 60 degrees) or when the physics diverges. Truncate after `episode_s`.
+    Start standing at phase 0 of the gait clock, joints within 0.03 rad of the home pose, settled for `settle_s`.
+    Terminate on a fall (trunk below 0.14 m, or tilted by more than 60 degrees) or when the physics diverges. Truncate
+    after `episode_s`.
 
     ``info``: task, command, filtered_command, base_velocity (vx, vy, yaw rate in the heading frame), contacts, phase,
     standing, reward_terms, fallen, ended ("", "fall", "unstable" or "time").
@@ -79,6 +82,8 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
     ## Arguments
 
     An `EnvConfig`, or its attributes as keyword arguments; and the fields of `PhysicsParams`, such as ``friction=0.5``.
+    With ``privileged=True`` its expert is told of them, and looks as far ahead as the actions are delayed.
+    Faults of the readings are given together, ``sensors={"encoder_offset": 0.03, "delay_s": 0.01}``.
 
     ## Version history
 
@@ -147,9 +152,9 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
         super().reset(seed=int(seed) if isinstance(seed, Integral) else seed)
         self._episode = begin_episode(self.config, self._simulation, self.np_random, name, command)
         state = self.state
-        observation = self._observe(self._episode, state)
+        observation = self._observe(self._episode, state, self._simulation.read())
         if self._expert is not None:
-            self._expert.reset(self._episode.state_source.estimate(state))
+            self._expert.reset(self.estimated_state)
         if self.render_mode == "human":
             self.render()
         return observation, self._episode.info(state, {}, "")
@@ -166,20 +171,22 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
         """
         episode = self._running("step")
         applied = np.clip(finite_vector(action, 12, "action"), -1.0, 1.0)
-        self._simulation.step(self.action_map.to_radians(applied), PHYSICS_HZ // self.control_hz)
+        target, early = self.action_map.to_radians(applied), episode.sensor_faults.early
+        reading = self._simulation.step(target, PHYSICS_HZ // self.control_hz, early)
         episode.advance(applied, self.control_s)
         state = self.state
         ended = how_it_ended(state, self._simulation.stable, episode.steps >= self.config.episode_steps)
         terms = episode.rewards(state, self._simulation.torque, ended)
-        observation = self._observe(episode, state)
+        observation = self._observe(episode, state, reading)
         if self.render_mode == "human":
             self.render()
         terminated = ended in ("fall", "unstable")
         return observation, sum(terms.values()), terminated, ended == "time", episode.info(state, terms, ended)
 
-    def _observe(self, episode: Episode, state: RobotState) -> np.ndarray:
+    def _observe(self, episode: Episode, state: RobotState, reading: Reading) -> np.ndarray:
         """The observation that a reset or step has led to, once the episode has taken it in."""
-        parts = measure(self._simulation, state, episode.last_action, episode.sensor_noise, self.np_random)
+        arriving = episode.sensor_faults.observe(reading)
+        parts = measure(arriving, state, episode.last_action, episode.sensor_noise, self.np_random)
         episode.remember(frame(parts))
         observation = self.layout.flatten(parts, episode.older_frames, self.tasks.index(episode.task.name))
         if self._simulation.stable:
@@ -248,8 +255,16 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
 
     @property
     def estimated_state(self) -> RobotState:
-        """All that an expert may read, now: `state`, with `estimator_noise` or as the `state_estimator` has it."""
-        return self._running("estimated_state").state_source.estimate(self.state)
+        """All that an expert may read, now: `state`, with `estimator_noise` or as the `state_estimator` has it.
+
+        In a privileged environment it tells how the robot differs from the model, and is the state in which an action
+        chosen now will take effect.
+        """
+        episode = self._running("estimated_state")
+        if not self.config.privileged:
+            return episode.state_source.estimate(self.state)
+        told = privileged_state(self._simulation, episode, PHYSICS_HZ // self.control_hz)
+        return episode.state_source.estimate(told)
 
     def expert_action(self) -> np.ndarray:
         """The expert's action for the `estimated_state`, float32, shape (12,). Changes nothing, here or later.

@@ -9,21 +9,22 @@ from go1_mtl_gym.actuation import PHYSICS_HZ, PDGains
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.expert import DEFAULT_EXPERT, check_expert
 from go1_mtl_gym.sensing.observation import ObservationLayout, SensorNoise
+from go1_mtl_gym.sensing.sensor_faults import SensorParams
 from go1_mtl_gym.sensing.state_estimator import StateEstimatorConfig
 from go1_mtl_gym.sensing.state_noise import EstimatorNoise
-from go1_mtl_gym.sim.domain_randomization import DomainRandomization
+from go1_mtl_gym.sim.domain_randomization import SETTLE_S, DomainRandomization
 from go1_mtl_gym.sim.physics_params import PhysicsParams
 from go1_mtl_gym.tasks import BUILT_IN_TASKS, check_task_names
-from go1_mtl_gym.validation import integer_in, number_in, one_of, parameters_of, switch
+from go1_mtl_gym.validation import integer_in, number_in, one_of, parameters_of, switch, yes_or_no
 
 DEFAULT_TASKS = BUILT_IN_TASKS
 """What an environment knows unless told otherwise, besides its own task: the tasks of the policy in the package."""
-DEFAULT_CHANNELS = ("command", "phase", "last_action")
+DEFAULT_CHANNELS = ("command", "phase", "last_action", "leg_kinematics")
 """What an environment shows unless told otherwise: the channels that the policy in the package sees."""
 RENDER_MODES = ("human", "rgb_array")
 PIXELS = (16, 4096)
 """Smallest and largest width and height of a picture [pixels]."""
-EXPERT_ONLY = ("estimator_noise", "state_estimator")
+EXPERT_ONLY = ("estimator_noise", "state_estimator", "privileged")
 """Arguments of `go1_mtl_gym.Go1Env` that only its expert notices."""
 _SWITCHES: Mapping[str, type] = {
     "noise": SensorNoise,
@@ -52,12 +53,17 @@ class EnvConfig:
         noise: of the sensors; True is the default one, None and False are exact sensors, a dictionary holds its fields.
         estimator_noise: on the state that the expert sees; likewise.
         state_estimator: that tells the expert the state from the sensors; likewise, and not with `estimator_noise`.
-        randomization: of physics and sensor noise at every reset; likewise.
+        randomization: of physics and sensors at every reset; likewise.
+        privileged: whether the expert is told how the robot differs from its model, `physics` and `randomization`
+            included, and answers for the time at which its action takes effect; not with `state_estimator`.
         episode_s: length of an episode [s].
         expert: ``"module:name"`` or a callable; a class or function that can be imported becomes a string.
         render_mode: None, "human" or "rgb_array".
         width, height: of the picture [pixels].
         physics: differences from the expert's model.
+        sensors: faults of the readings that are observed; the expert's state has none.
+        settle_s: time for which the robot stands before the episode begins [s], rounded to milliseconds: under
+            action 0, until joints and feet have given way.
         robot: path of an MJCF file of another Go1, or None for ours; the experts go on thinking of ours.
 
     Raises:
@@ -81,6 +87,9 @@ class EnvConfig:
     width: int = 640
     height: int = 480
     physics: PhysicsParams = field(default_factory=PhysicsParams)
+    sensors: SensorParams = field(default_factory=SensorParams)
+    settle_s: float = 0.0
+    privileged: bool = False
     robot: str | None = None
 
     def __post_init__(self) -> None:
@@ -104,6 +113,9 @@ class EnvConfig:
             width=integer_in(self.width, *PIXELS, "width [pixels]"),
             height=integer_in(self.height, *PIXELS, "height [pixels]"),
             physics=parameters_of(self.physics, PhysicsParams, "physics"),
+            sensors=parameters_of(self.sensors, SensorParams, "sensors"),
+            settle_s=number_in(self.settle_s, *SETTLE_S, "settle_s [s]"),
+            privileged=yes_or_no(self.privileged, "privileged"),
             robot=_path(self.robot),
         )
         self._check_together()
@@ -117,6 +129,11 @@ class EnvConfig:
             raise InvalidInputError(
                 "estimator_noise stands for the errors of an estimator and state_estimator has its own: give one of "
                 f"them, got {self.estimator_noise} and {self.state_estimator}"
+            )
+        if self.privileged and self.state_estimator is not None:
+            raise InvalidInputError(
+                "a privileged expert is told what a state_estimator has to find out: give one of them, got "
+                f"{self.state_estimator}"
             )
         if self.randomization is not None and self.randomization.noise is not None:
             self.scaled_noise(self.randomization.noise[1])  # refuses what could be drawn

@@ -1,5 +1,6 @@
 """One episode: how it begins, what it carries from step to step, and when it is over."""
 
+import copy
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -8,14 +9,17 @@ from typing import Any
 import numpy as np
 
 from go1_mtl_gym import robot
+from go1_mtl_gym.actuation import PHYSICS_HZ
 from go1_mtl_gym.env_config import EnvConfig
 from go1_mtl_gym.gaits import next_phase, passes
 from go1_mtl_gym.rewards import reward_terms
 from go1_mtl_gym.sensing.observation import SensorNoise
+from go1_mtl_gym.sensing.sensor_faults import SensorFaults
 from go1_mtl_gym.sensing.state import RobotState
 from go1_mtl_gym.sensing.state_estimator import StateEstimator
 from go1_mtl_gym.sensing.state_noise import EstimatorError
 from go1_mtl_gym.sensing.state_source import StateSource, TrueState
+from go1_mtl_gym.sim.domain_randomization import EpisodeConditions
 from go1_mtl_gym.sim.simulation import Simulation
 from go1_mtl_gym.tasks import TASKS, Task
 
@@ -59,6 +63,7 @@ class Episode:
         frames: the latest proprioceptive frames, newest first, each of shape (34,); its `maxlen` is their number.
         last_action: the action applied during the last step, in [-1, 1], shape (12,); 0, a stand, before the first.
         sensor_noise: what is added to the sensors' readings, or None.
+        sensor_faults: what else is wrong with them.
         state_source: where the expert's state comes from.
         filtered_command: what expert and student see of the command, shape (3,).
         phase: the gait clock [cycles], in [0, 1).
@@ -72,6 +77,7 @@ class Episode:
     frames: deque[np.ndarray]
     last_action: np.ndarray = field(default_factory=lambda: np.zeros(len(robot.JOINTS)))
     sensor_noise: SensorNoise | None = None
+    sensor_faults: SensorFaults = field(default_factory=SensorFaults)
     state_source: StateSource = field(default_factory=TrueState)
     filtered_command: np.ndarray = field(default_factory=lambda: np.zeros(3))
     phase: float = 0.0
@@ -98,14 +104,32 @@ class Episode:
             action: that was applied meanwhile, in [-1, 1], shape (12,).
             control_s: the period [s].
         """
-        before, mark = self.phase, self.task.gait.change_phase
-        self.phase = next_phase(self.task.gait, before, self.filtered_command, control_s)
-        if self.next_task is not None and (mark is None or before == self.phase or passes(mark, before, self.phase)):
-            self.change_task(self.next_task, 0.0)
-        self.filtered_command = filtered(self.command, self.filtered_command, control_s)
+        self._pass(control_s)
         self.last_action = action
         self.steps += 1
         self.time_s = self.steps * control_s
+
+    def _pass(self, seconds: float) -> None:
+        """Clock, task and command filter after some time, at most a control period."""
+        before, mark = self.phase, self.task.gait.change_phase
+        self.phase = next_phase(self.task.gait, before, self.filtered_command, seconds)
+        if self.next_task is not None and (mark is None or before == self.phase or passes(mark, before, self.phase)):
+            self.change_task(self.next_task, 0.0)
+        self.filtered_command = filtered(self.command, self.filtered_command, seconds)
+
+    def ahead(self, physics_steps: int, period: int) -> "Episode":
+        """The episode some time later, if nobody asks for anything else; this one stays as it is.
+
+        Args:
+            physics_steps: how much later.
+            period: physics steps per control period.
+        """
+        later = copy.copy(self)  # whatever changes is replaced, not written to
+        whole, rest = divmod(physics_steps, period)
+        for steps in [period] * whole + [rest] * bool(rest):
+            later._pass(steps / PHYSICS_HZ)
+        later.time_s = self.time_s + physics_steps / PHYSICS_HZ
+        return later
 
     def remember(self, frame: np.ndarray) -> None:
         """Take in the newest frame, shape (34,); the first one of an episode also stands for those before it."""
@@ -186,28 +210,43 @@ def begin_episode(
     task: str | None = None,
     command: np.ndarray | None = None,
 ) -> Episode:
-    """Stand the robot up, and begin an episode there.
+    """Stand the robot up, let it settle, and begin an episode there.
 
     Args:
         config: the environment's.
         simulation: is reset; gets its physics if there is a randomization, and keeps them otherwise.
         rng: of everything that is drawn. It gives as many numbers whatever was asked for, one of them for the estimator
-            noise and one for the randomization, if there are any.
+            noise, one for encoder offsets and one for the randomization, if there are any.
         task: name of the task; None draws one.
         command: (vx [m/s], vy [m/s], yaw rate [rad/s]), shape (3,); None takes the one that is drawn.
     """
     chosen = TASKS[task or str(rng.choice(config.tasks))]
     drawn = chosen.draw_command(rng)
     joint_noise = rng.uniform(-RESET_JOINT_NOISE, RESET_JOINT_NOISE, len(robot.JOINTS))
-    source, noise = _state_source(config, rng), config.noise
+    source, conditions = _state_source(config, rng), _conditions(config, rng)
     if config.randomization is not None:
-        stream = np.random.default_rng(int(rng.integers(2**63)))
-        physics, factor = config.randomization.draw(stream, config.physics)
-        simulation.set_physics_params(physics)
-        noise = noise if factor is None else config.scaled_noise(factor)
+        simulation.set_physics_params(conditions.physics)
     simulation.reset(robot.HOME_POSE + joint_noise)
-    command = drawn if command is None else command
-    return Episode(chosen, command, deque(maxlen=config.history), sensor_noise=noise, state_source=source)
+    simulation.settle(robot.HOME_POSE, round(conditions.settle_s * PHYSICS_HZ))
+    return Episode(
+        chosen,
+        drawn if command is None else command,
+        deque(maxlen=config.history),
+        sensor_noise=config.noise if conditions.noise is None else config.scaled_noise(conditions.noise),
+        sensor_faults=SensorFaults.of(conditions.sensors, config.control_hz),
+        state_source=source,
+    )
+
+
+def _conditions(config: EnvConfig, rng: np.random.Generator) -> EpisodeConditions:
+    sensors = config.sensors.drawn(_stream(rng)) if config.sensors.is_drawn else config.sensors
+    own = EpisodeConditions(config.physics, sensors, settle_s=config.settle_s)
+    return own if config.randomization is None else config.randomization.draw(_stream(rng), own)
+
+
+def _stream(rng: np.random.Generator) -> np.random.Generator:
+    """A generator of its own for what takes many numbers, so that the given one gives a single number."""
+    return np.random.default_rng(int(rng.integers(2**63)))
 
 
 def _state_source(config: EnvConfig, rng: np.random.Generator) -> StateSource:

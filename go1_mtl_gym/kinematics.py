@@ -4,7 +4,8 @@ import numpy as np
 
 from go1_mtl_gym import robot
 
-_AXIS_X = np.broadcast_to([1.0, 0.0, 0.0], (4, 3))
+_CENTER = np.zeros(3)
+"""In place of the direction up: of a foot its centre, not its lowest point."""
 
 
 def contact_points(q: np.ndarray, dq: np.ndarray, up_b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -21,26 +22,23 @@ def contact_points(q: np.ndarray, dq: np.ndarray, up_b: np.ndarray) -> tuple[np.
         Positions [m] and velocities [m/s], shape (4, 3) each.
     """
     hip, thigh, calf = q.reshape(4, 3).T
+    hip_speed, thigh_speed, calf_speed = dq.reshape(4, 3).T
     cos, sin = np.cos(hip), np.sin(hip)
-    zero = np.zeros(4)
-    down = np.column_stack([zero, sin, -cos])  # of the thigh's plane: -z of the trunk, turned by the hip about x
-    across = np.column_stack([zero, cos, sin])  # axis of thigh and calf: y, turned likewise
-
-    def along(angle: np.ndarray) -> np.ndarray:
-        """Direction of a link that hangs down at angle 0 and is turned about `across`."""
-        return np.cos(angle)[:, None] * down - np.sin(angle)[:, None] * _AXIS_X
-
-    hip_at = robot.HIP_POSITION_B
-    thigh_at = hip_at + (robot.LEG_SIDE * robot.HIP_TO_THIGH)[:, None] * across
-    calf_at = thigh_at + robot.THIGH_LENGTH * along(thigh)
-    point = calf_at + robot.CALF_LENGTH * along(thigh + calf) - robot.FOOT_RADIUS * up_b
-    speeds = dq.reshape(4, 3, 1)
-    velocity = (
-        speeds[:, 0] * np.cross(_AXIS_X, point - hip_at)
-        + speeds[:, 1] * np.cross(across, point - thigh_at)
-        + speeds[:, 2] * np.cross(across, point - calf_at)
+    # In the thigh's plane: forward is x, down is -z of the trunk turned by the hip about x.
+    calf_forward = -robot.CALF_LENGTH * np.sin(thigh + calf)
+    calf_down = robot.CALF_LENGTH * np.cos(thigh + calf)
+    leg_forward = calf_forward - robot.THIGH_LENGTH * np.sin(thigh)
+    leg_down = calf_down + robot.THIGH_LENGTH * np.cos(thigh)
+    sideways = robot.LEG_SIDE * robot.HIP_TO_THIGH
+    x, y, z = (-robot.FOOT_RADIUS * up_b).tolist()  # from the foot's centre to its lowest point
+    from_hip = np.stack([leg_forward + x, sideways * cos + leg_down * sin + y, sideways * sin - leg_down * cos + z], 1)
+    # Thigh and calf turn about (0, cos, sin): v = omega (0, cos, sin) x r.
+    forward = calf_speed * calf_forward + thigh_speed * leg_forward + (thigh_speed + calf_speed) * x
+    down = -(calf_speed * calf_down + thigh_speed * leg_down) + (thigh_speed + calf_speed) * (cos * z - sin * y)
+    velocity = np.stack(
+        [down, -hip_speed * from_hip[:, 2] + sin * forward, hip_speed * from_hip[:, 1] - cos * forward], 1
     )
-    return point, velocity
+    return robot.HIP_POSITION_B + from_hip, velocity
 
 
 def leg_kinematics(q: np.ndarray, dq: np.ndarray, angular_velocity_b: np.ndarray) -> np.ndarray:
@@ -54,5 +52,7 @@ def leg_kinematics(q: np.ndarray, dq: np.ndarray, angular_velocity_b: np.ndarray
     Returns:
         Shape (24,), in the trunk frame: the centres of the feet p [m], 4 x 3, then the velocities [m/s], 4 x 3.
     """
-    feet_b, velocity_b = contact_points(q, dq, np.zeros(3))
-    return np.concatenate([feet_b.ravel(), -(velocity_b + np.cross(angular_velocity_b, feet_b)).ravel()])
+    feet_b, velocity_b = contact_points(q, dq, _CENTER)
+    x, y, z = angular_velocity_b.tolist()
+    turn = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])  # p @ turn = omega x p
+    return np.concatenate([feet_b.ravel(), -(velocity_b + feet_b @ turn).ravel()])

@@ -27,6 +27,8 @@ MASS = 12.743448
 """Total mass [kg]."""
 GRAVITY = 9.81
 """[m/s^2]"""
+PAYLOAD_SIDE = 0.1
+"""Side of the cube that a payload is [m]; its centre is the trunk's centre of mass."""
 JOINT_LOWER = _every_leg(-0.863, -0.686, -2.818)
 JOINT_UPPER = _every_leg(0.863, 4.501, -0.888)
 """Joint range [rad], shape (12,)."""

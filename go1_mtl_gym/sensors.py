@@ -7,6 +7,7 @@ import numpy as np
 from go1_mtl_gym.gaits import Gait
 from go1_mtl_gym.kinematics import leg_kinematics
 from go1_mtl_gym.sensing.observation import PROPRIOCEPTION, SensorNoise
+from go1_mtl_gym.sensing.sensor_faults import Reading
 from go1_mtl_gym.sensing.state import RobotState
 from go1_mtl_gym.sim.simulation import Simulation
 
@@ -38,7 +39,7 @@ def robot_state(simulation: Simulation, gait: Gait, phase: float, command: np.nd
 
 
 def measure(
-    simulation: Simulation,
+    reading: Reading,
     state: RobotState,
     last_action: np.ndarray,
     noise: SensorNoise | None,
@@ -47,29 +48,30 @@ def measure(
     """Every part of an observation by name, now, whether a layout has it or not; finite even if the physics diverged.
 
     Args:
-        simulation: whose sensors are read.
+        reading: that arrives from the sensors now.
         state: of the robot, now.
         last_action: the action applied during the last step, shape (12,).
         noise: of the sensors, or None.
         rng: that the noise is drawn from.
     """
-    reading = simulation.read()
     turn = 2 * np.pi * state.phase
     parts = {
         "accelerometer": reading.accelerometer,
         "gyroscope": reading.gyroscope,
-        "q": state.q,
-        "dq": state.v,
+        "q": reading.q,
+        "dq": reading.dq,
         "contacts": reading.contacts,
         "command": state.command,
-        "gravity": state.gravity_b,
+        "gravity": reading.gravity,
         "phase": np.array([np.sin(turn), np.cos(turn)]),
         "last_action": last_action,
     }
     if noise is not None:
         noise.apply(parts, rng)
     parts["leg_kinematics"] = leg_kinematics(parts["q"], parts["dq"], parts["gyroscope"])
-    return parts if simulation.stable else {name: np.nan_to_num(part) for name, part in parts.items()}
+    if np.isfinite(sum(float(part.sum()) for part in parts.values())):
+        return parts
+    return {name: np.nan_to_num(part) for name, part in parts.items()}
 
 
 def frame(parts: Mapping[str, np.ndarray]) -> np.ndarray:

@@ -129,6 +129,17 @@ def one_of(value: object, allowed: Sequence[str], label: str) -> str:
     return str(value)
 
 
+def yes_or_no(value: object, label: str) -> bool:
+    """Return `value` as a bool.
+
+    Raises:
+        InvalidInputError: if it is neither True nor False.
+    """
+    if not isinstance(value, (bool, np.bool_)):
+        raise InvalidInputError(f"{label} must be True or False, got {value!r}")
+    return bool(value)
+
+
 def switch(value: object, kind: type[Parameters], label: str) -> Parameters | None:
     """Return parameters that can be switched on: True gives the defaults of their kind; None and False give None.
 

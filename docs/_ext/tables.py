@@ -3,7 +3,7 @@
 import inspect
 import re
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import fields
+from dataclasses import MISSING, fields
 from pathlib import Path
 
 from experiments.catalog import STUDIES, study_class, summary_line
@@ -16,6 +16,7 @@ from go1_mtl_gym import (
     PhysicsParams,
     RewardWeights,
     SensorNoise,
+    SensorParams,
     env_id,
     robot,
 )
@@ -155,14 +156,24 @@ def optional_parts() -> str:
 
 def physics() -> str:
     """Ways in which the physics can differ, with the ranges of `DomainRandomization`."""
-    meaning, ranges = described(PhysicsParams), DomainRandomization()
-    rows = []
-    for each in fields(PhysicsParams):
-        low, high = getattr(ranges, each.name)
-        rows.append((f"`{each.name}`", f"`{each.default}`", f"{low:g} ... {high:g}", meaning[each.name]))
-    low, high = ranges.noise
-    rows.append(("`noise`", "", f"{low:g} ... {high:g}", "factor on the sensor noise, or on the default one"))
+    rows = [_ranged(PhysicsParams, each.name, each.name) for each in fields(PhysicsParams)]
     return markdown(("argument", "default", "randomized over", "meaning"), rows)
+
+
+def sensors() -> str:
+    """Faults of the sensors, with the ranges of `DomainRandomization`."""
+    rows = [
+        _ranged(SensorParams, "encoder_offset", "encoder_offset"),
+        _ranged(SensorParams, "delay_s", "sensor_delay_s"),
+    ]
+    return markdown(("field", "default", "randomized over", "meaning"), rows)
+
+
+def _ranged(kind: type, name: str, drawn: str) -> tuple[str, ...]:
+    """A field of a dataclass, and its range in `DomainRandomization`, where it may have another name."""
+    default = next(each.default for each in fields(kind) if each.name == name)
+    low, high = getattr(DomainRandomization(), drawn)
+    return f"`{name}`", f"`{default}`", f"{low:g} ... {high:g}", described(kind)[name]
 
 
 def sensor_noise() -> str:
@@ -187,7 +198,7 @@ def rewards() -> str:
 def arguments() -> str:
     """Every keyword argument of the environment, with its default."""
     meaning = described(EnvConfig)
-    defaults = {each.name: each.default for each in fields(EnvConfig) if each.name != "physics"}
+    defaults = {each.name: each.default for each in fields(EnvConfig) if each.default is not MISSING}
     rows = [(f"`{name}`", f"`{default!r}`", meaning[name]) for name, default in defaults.items()]
     return markdown(("argument", "default", "meaning"), rows)
 
@@ -250,6 +261,7 @@ TABLES: dict[str, Callable[[], str]] = {
         paper_observation,
         optional_parts,
         physics,
+        sensors,
         sensor_noise,
         rewards,
         arguments,

@@ -27,6 +27,7 @@ class Horizon(NamedTuple):
         contact: fractions of each interval that the feet spend on the ground, shape (N, 4).
         feet: where they push from [m], shape (N, 4, 3).
         inertia_b: composite inertia, trunk axes [kg m^2], shape (3, 3).
+        mass: of the whole robot [kg].
     """
 
     frame: Frame
@@ -37,6 +38,7 @@ class Horizon(NamedTuple):
     contact: np.ndarray
     feet: np.ndarray
     inertia_b: np.ndarray
+    mass: float
 
 
 def pose_horizon(
@@ -75,16 +77,17 @@ def pose_horizon(
         dt=dt,
         x0=np.concatenate([(roll, pitch, 0.0), com, turning, moving]),
         reference=reference,
-        nominal=_nominal_inputs(motion, middle, reference),
+        nominal=_nominal_inputs(motion, middle, reference, dynamics.mass),
         contact=np.ones((steps, 4)) if state.standing else gait.contact_schedule(state.phase, dt, steps),
         feet=frame.points(feet_w),
         inertia_b=state.rotation.T @ dynamics.inertia_w @ state.rotation,
+        mass=dynamics.mass,
     )
 
 
-def _nominal_inputs(motion: NominalMotion, phase: np.ndarray, reference: np.ndarray) -> np.ndarray:
+def _nominal_inputs(motion: NominalMotion, phase: np.ndarray, reference: np.ndarray, mass: float) -> np.ndarray:
     """The nominal motion's forces at phases of the intervals, turned with the reference's yaw, shape (N, 12)."""
-    nominal = motion.force_at(phase) * (robot.MASS * robot.GRAVITY / FORCE_UNIT)
+    nominal = motion.force_at(phase) * (mass * robot.GRAVITY / FORCE_UNIT)
     sideways = to_complex_array(nominal) * turn(reference[:-1, 2:3])
     nominal[..., 0], nominal[..., 1] = sideways.real, sideways.imag
     return nominal.reshape(len(phase), 12)

@@ -1,7 +1,7 @@
 """The MPC's prediction model: a single rigid body pushed by four feet, linearized along a trajectory.
 
 State x = [rpy, p, omega, v] (attitude as roll-pitch-yaw, centre of mass, angular velocity, velocity; world frame) and
-input u = the four ground forces in the world, in units of half the robot's weight. The nonlinear model is
+input u = the four ground forces in the world, in units of half the unloaded robot's weight. The nonlinear model is
 
     (1)  d(rpy)/dt = E(rpy) omega
     (2)  dp/dt = v
@@ -55,7 +55,12 @@ class LinearModel:
 
 
 def linearize(
-    states: np.ndarray, inputs: np.ndarray, feet_w: np.ndarray, inertia_b: np.ndarray, dt: float
+    states: np.ndarray,
+    inputs: np.ndarray,
+    feet_w: np.ndarray,
+    inertia_b: np.ndarray,
+    dt: float,
+    mass: float | None = None,
 ) -> LinearModel:
     """Equations (5)-(7) along a trajectory.
 
@@ -65,10 +70,11 @@ def linearize(
         feet_w: where the feet push from, world [m], shape (N, 4, 3).
         inertia_b: composite inertia about the centre of mass, trunk axes [kg m^2], shape (3, 3).
         dt: interval [s].
+        mass: of the body [kg]; None for the unloaded robot's.
     """
     middle = (states[:-1] + states[1:]) / 2
     inverse_b = np.linalg.inv(inertia_b)
-    constants = FORCE_UNIT, robot.MASS, robot.GRAVITY
+    constants = FORCE_UNIT, robot.MASS if mass is None else mass, robot.GRAVITY
     return LinearModel(*_linearize(middle, inputs * FORCE_UNIT, feet_w, inertia_b, inverse_b, dt, constants))
 
 

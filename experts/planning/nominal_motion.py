@@ -81,7 +81,9 @@ def _integrate(rate: np.ndarray, dt: float) -> np.ndarray:
 
 
 @lru_cache(maxsize=64)
-def nominal_motion(gait: Gait, inertia: tuple[float, float, float], height: float) -> NominalMotion:
+def nominal_motion(
+    gait: Gait, inertia: tuple[float, float, float], height: float, mass: float | None = None
+) -> NominalMotion:
     """The periodic motion of a body whose feet stand under their hips.
 
     Newton and Euler for small angles, F = sum f, feet at (x_i, y_i, -h) from the centre of mass:
@@ -96,6 +98,7 @@ def nominal_motion(gait: Gait, inertia: tuple[float, float, float], height: floa
         gait: the contact plan.
         inertia: Ixx, Iyy, Izz of the whole robot [kg m^2].
         height: h [m].
+        mass: m [kg]; None for the unloaded robot's.
     """
     phase = np.arange(SAMPLES) / SAMPLES
     stance = gait.stance(phase)
@@ -116,7 +119,7 @@ def nominal_motion(gait: Gait, inertia: tuple[float, float, float], height: floa
             center[:, 0] * horizontal[:, 1] - center[:, 1] * horizontal[:, 0],
         ]
     )
-    weight = robot.MASS * robot.GRAVITY
+    weight = (robot.MASS if mass is None else mass) * robot.GRAVITY
     acceleration = np.column_stack(
         [
             weight * moment / np.array(inertia),

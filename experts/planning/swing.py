@@ -18,8 +18,8 @@ class SwingRule:
     """PD tracking of a nominal swing.
 
     Horizontally the foot moves, relative to where it will land, from one step length behind to zero along a cubic;
-    vertically along 16 h s^2 (1 - s)^2. No lift-off position is remembered: a foot that was pushed elsewhere is drawn
-    back to the nominal arc.
+    vertically along 16 h s^2 (1 - s)^2, where h is the gait's swing height and as much again as feet sink into soft
+    ground. No lift-off position is remembered: a foot that was pushed elsewhere is drawn back to the nominal arc.
 
     Attributes:
         stiffness: [1/s^2].
@@ -63,7 +63,7 @@ class SwingRule:
         progress = np.maximum(leg - gait.duty, 0.0) / (1.0 - gait.duty)
         remaining = (1.0 - progress) * gait.swing_s + ahead_s
         landing = footholds.plan(state, dynamics.com_w, velocity_w, remaining)
-        arc = gait.swing_height, self.press, self.early, gait.swing_s, gait.period, robot.FOOT_RADIUS
+        arc = gait.swing_height + state.foot_sink, self.press, self.early, gait.swing_s, gait.period, robot.FOOT_RADIUS
         return _track(
             progress,
             ahead_s,

@@ -27,6 +27,11 @@ class RobotState:
         phase: the gait clock [cycles], in [0, 1).
         command: filtered (vx [m/s], vy [m/s], yaw rate [rad/s]) in the heading frame, shape (3,).
         time_s: since the reset [s].
+        payload_kg: mass of a cube at the trunk's centre of mass that the expert is told of [kg].
+        motor_strength: factor on the torques of the actuators, likewise.
+        joint_friction: dry friction of every joint beyond the model's, likewise [N m].
+        joint_damping: of every joint beyond the model's, likewise [N m s/rad].
+        foot_sink: how much deeper than the model's the feet of the standing robot sink into the ground, likewise [m].
     """
 
     position_w: np.ndarray
@@ -40,6 +45,11 @@ class RobotState:
     phase: float
     command: np.ndarray
     time_s: float = 0.0
+    payload_kg: float = 0.0
+    motor_strength: float = 1.0
+    joint_friction: float = 0.0
+    joint_damping: float = 0.0
+    foot_sink: float = 0.0
 
     @cached_property
     def standing(self) -> bool:

@@ -1,15 +1,37 @@
 """Physics and sensors that differ from episode to episode."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
 from go1_mtl_gym.deprecation import renamed_arguments
 from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.sensing.sensor_faults import SensorParams
 from go1_mtl_gym.sim.physics_params import PhysicsParams
 from go1_mtl_gym.validation import finite_vector, number_in
 
 Range = tuple[float, float] | None
+_OF_SENSORS = {"encoder_offset": "encoder_offset", "sensor_delay_s": "delay_s"}
+"""Ranges of fields of `SensorParams`."""
+SETTLE_S = (0.0, 10.0)
+"""Shortest and longest time for which a robot may stand before an episode begins [s]."""
+
+
+@dataclass(frozen=True)
+class EpisodeConditions:
+    """What can differ from episode to episode.
+
+    Attributes:
+        physics: differences from the expert's model.
+        sensors: faults of the readings.
+        noise: factor on the sensor noise; None leaves the noise as it is.
+        settle_s: time for which the robot stands before the episode begins [s].
+    """
+
+    physics: PhysicsParams = field(default_factory=PhysicsParams)
+    sensors: SensorParams = field(default_factory=SensorParams)
+    noise: float | None = None
+    settle_s: float = 0.0
 
 
 @renamed_arguments(share="fraction")
@@ -18,9 +40,12 @@ class DomainRandomization:
     """Ranges (low, high) that an episode's figures are drawn from, uniformly; None leaves the environment's own.
 
     Attributes:
-        friction, payload_kg, action_delay_s, motor_strength, joint_friction, rotor_inertia, contact_time_s: as in
-            `go1_mtl_gym.sim.physics_params.PhysicsParams`.
+        friction, payload_kg, action_delay_s, motor_strength, joint_friction, rotor_inertia, contact_time_s,
+            joint_damping: as in `go1_mtl_gym.sim.physics_params.PhysicsParams`.
         noise: factor on the environment's `SensorNoise`, or on the default one if the environment has none.
+        encoder_offset: largest constant error of the joint positions [rad]; each joint's is drawn within it.
+        sensor_delay_s: age of the readings [s].
+        settle_s: time for which the robot stands before the episode begins [s].
         fraction: of the episodes that are randomized; the others are as without randomization.
 
     Raises:
@@ -33,8 +58,12 @@ class DomainRandomization:
     motor_strength: Range = (0.9, 1.1)
     joint_friction: Range = (0.0, 1.0)
     rotor_inertia: Range = (0.0, 0.01)
-    contact_time_s: Range = (0.005, 0.04)
+    contact_time_s: Range = (0.005, 0.16)
     noise: Range = (0.0, 1.5)
+    joint_damping: Range = (0.0, 1.0)
+    encoder_offset: Range = (0.0, 0.06)
+    sensor_delay_s: Range = (0.0, 0.02)
+    settle_s: Range = (0.0, 0.5)
     fraction: float = 1.0
 
     def __post_init__(self) -> None:
@@ -48,29 +77,32 @@ class DomainRandomization:
             for end in (low, high):
                 if name == "noise":
                     number_in(end, 0.0, 10.0, "factor on the sensor noise")
+                elif name == "settle_s":
+                    number_in(end, *SETTLE_S, "settle_s [s]")
+                elif name in _OF_SENSORS:
+                    SensorParams(**{_OF_SENSORS[name]: end})
                 else:
                     PhysicsParams(**{name: end})
 
-    def draw(self, rng: np.random.Generator, base: PhysicsParams) -> tuple[PhysicsParams, float | None]:
+    def draw(self, rng: np.random.Generator, base: EpisodeConditions) -> EpisodeConditions:
         """Draw the figures of an episode; every call takes as many numbers from the generator.
 
         Args:
             rng: where the randomness comes from.
             base: the environment's own figures.
-
-        Returns:
-            The physics, and the factor on the sensor noise; None leaves the noise as it is.
         """
         chance, *levels = rng.uniform(size=len(fields(self))).tolist()
-        if chance >= self.fraction:
-            return base, None
         level = dict(zip((each.name for each in fields(self)), levels))
         drawn = {
             name: min(low + level[name] * (high - low), high)  # rounding must not lead beyond the end
             for name, (low, high) in self._ranges().items()
         }
-        factor = drawn.pop("noise", None)
-        return replace(base, **drawn), factor
+        noise, settle_s = drawn.pop("noise", base.noise), drawn.pop("settle_s", base.settle_s)
+        faults = {own: drawn.pop(name) for name, own in _OF_SENSORS.items() if name in drawn}
+        sensors = replace(base.sensors, **faults).drawn(rng)
+        if chance >= self.fraction:
+            return base
+        return EpisodeConditions(replace(base.physics, **drawn), sensors, noise, settle_s)
 
     def _ranges(self) -> dict[str, tuple[float, float]]:
         """The ranges that are not None, by name."""

@@ -10,8 +10,6 @@ from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PHYSICS_HZ
 from go1_mtl_gym.validation import Limits, check_numbers
 
-PAYLOAD_SIDE = 0.1
-"""Side of the cube that the payload is [m]."""
 INERTIAL_ARRAYS = ("body_mass", "body_inertia", "dof_armature")
 """Those arrays of a model after whose change `mj_setConst` is due."""
 CHANGED_ARRAYS = (
@@ -19,6 +17,7 @@ CHANGED_ARRAYS = (
     "geom_friction",
     "geom_solref",
     "dof_frictionloss",
+    "dof_damping",
     "actuator_gainprm",
     "actuator_biasprm",
     "actuator_forcerange",
@@ -32,13 +31,14 @@ _ALLOWED = {
     "motor_strength": Limits(0.5, 1.5),
     "joint_friction": Limits(0.0, 5.0, " [N m]"),
     "rotor_inertia": Limits(0.0, 0.1, " [kg m^2]"),
-    "contact_time_s": Limits(0.002, 0.1, " [s]"),
+    "contact_time_s": Limits(0.002, 0.2, " [s]"),
+    "joint_damping": Limits(0.0, 3.0, " [N m s/rad]"),
 }
 
 
 @dataclass(frozen=True)
 class PhysicsParams:
-    """What is different about the physics; the defaults change nothing. The expert is told none of it.
+    """What is different about the physics; the defaults change nothing. The expert of a privileged environment knows.
 
     Attributes:
         friction: coefficient of sliding friction between robot and ground, or None for the model's own.
@@ -48,6 +48,7 @@ class PhysicsParams:
         joint_friction: dry friction of every joint [N m], or None for the model's own.
         rotor_inertia: of every motor, as its joint feels it [kg m^2], or None for the model's own.
         contact_time_s: time constant of the contacts of the feet [s], small is stiff; None for the model's own.
+        joint_damping: torque per speed that brakes every joint [N m s/rad], or None for the model's own.
 
     Raises:
         InvalidInputError: if a figure is outside its range.
@@ -60,6 +61,7 @@ class PhysicsParams:
     joint_friction: float | None = None
     rotor_inertia: float | None = None
     contact_time_s: float | None = None
+    joint_damping: float | None = None
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -71,7 +73,7 @@ class PhysicsParams:
         return round(self.action_delay_s * PHYSICS_HZ)
 
     def as_vector(self) -> np.ndarray:
-        """All figures in their order, shape (7,); None is -1."""
+        """All figures in their order, shape (8,); None is -1."""
         return np.array([_NONE if value is None else value for value in astuple(self)], dtype=np.float64)
 
     @classmethod
@@ -92,13 +94,15 @@ class PhysicsParams:
             model.geom_friction[:, 0] = self.friction
         trunk = model.body("trunk").id
         model.body_mass[trunk] += self.payload_kg
-        model.body_inertia[trunk] += self.payload_kg * PAYLOAD_SIDE**2 / 6
+        model.body_inertia[trunk] += self.payload_kg * robot.PAYLOAD_SIDE**2 / 6
         for array in (model.actuator_gainprm, model.actuator_biasprm, model.actuator_forcerange):
             array *= self.motor_strength
         if self.joint_friction is not None:
             model.dof_frictionloss[6:] = self.joint_friction
         if self.rotor_inertia is not None:
             model.dof_armature[6:] = self.rotor_inertia
+        if self.joint_damping is not None:
+            model.dof_damping[6:] = self.joint_damping
         if self.contact_time_s is not None:
             model.geom_solref[[model.geom(f"{leg}_foot").id for leg in robot.LEGS], 0] = self.contact_time_s
 
@@ -131,5 +135,14 @@ class ActionDelay:
             return [(target, physics_steps)]
         line = np.vstack([self.waiting, np.tile(target, (physics_steps, 1))])
         now, self.waiting = np.split(line, [physics_steps])
-        starts = np.r_[0, 1 + np.flatnonzero((np.diff(now, axis=0) != 0).any(axis=1)), physics_steps]
-        return [(now[start], int(end - start)) for start, end in zip(starts[:-1], starts[1:])]
+        return _runs(now)
+
+    def pending(self) -> list[tuple[np.ndarray, int]]:
+        """What the actuators will hold until a target that is commanded now takes effect, as of `send`."""
+        return _runs(self.waiting) if len(self.waiting) else []
+
+
+def _runs(line: np.ndarray) -> list[tuple[np.ndarray, int]]:
+    """Equal neighbors among targets, shape (steps, 12), together: each target, and how often it stands there."""
+    starts = np.r_[0, 1 + np.flatnonzero((np.diff(line, axis=0) != 0).any(axis=1)), len(line)]
+    return [(line[start], int(end - start)) for start, end in zip(starts[:-1], starts[1:])]

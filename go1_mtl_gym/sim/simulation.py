@@ -1,12 +1,14 @@
 """The robot in MuJoCo: stepping, reading and writing its state. Knows nothing of tasks, gaits or rewards."""
 
-from dataclasses import dataclass
+import copy
 
 import mujoco
 import numpy as np
 
 from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PHYSICS_HZ, PDGains
+from go1_mtl_gym.rotations import matrix_from_quat
+from go1_mtl_gym.sensing.sensor_faults import Reading
 from go1_mtl_gym.sim import robot_file
 from go1_mtl_gym.sim.physics_params import CHANGED_ARRAYS, INERTIAL_ARRAYS, ActionDelay, PhysicsParams
 
@@ -14,15 +16,6 @@ CONTACT_FORCE = 2.0
 """A foot counts as on the ground when it presses with more than this [N]."""
 _STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 _UNSTABLE = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
-
-
-@dataclass(frozen=True)
-class Reading:
-    """What the robot's sensors say at one instant; frames and units as in `go1_mtl_gym.sensing.observation`."""
-
-    accelerometer: np.ndarray
-    gyroscope: np.ndarray
-    contacts: np.ndarray
 
 
 class Simulation:
@@ -49,6 +42,7 @@ class Simulation:
         else:
             self.model = robot_file.load(robot_path)
         self.data = mujoco.MjData(self.model)
+        self._scratch: mujoco.MjData | None = None
         self.model.opt.timestep = 1.0 / PHYSICS_HZ
         self.model.actuator_gainprm[:, 0] = gains.kp
         self.model.actuator_biasprm[:, 1] = -gains.kp
@@ -100,16 +94,67 @@ class Simulation:
         self._delay.reset(self.data.ctrl)
         self.physics_params = physics_params
 
-    def step(self, target: np.ndarray, physics_steps: int) -> None:
+    def step(self, target: np.ndarray, physics_steps: int, read_early: int = 0) -> Reading:
         """Command joint targets [rad], shape (12,), for a number of 1 ms steps; the delay decides when they are held.
 
         Sensors, contacts and torques read afterwards belong to the state after the step: `mj_step` leaves those of
         the state before it, so the forward pass is run once more.
+
+        Args:
+            target: of the joints.
+            physics_steps: for how long.
+            read_early: physics steps between the reading that is returned and the end, less than `physics_steps`. It
+                changes nothing about what happens, to the bit.
         """
-        for held, steps in self._delay.send(target, physics_steps):
+        self._hold(target, physics_steps - read_early)
+        if not read_early:
+            mujoco.mj_forward(self.model, self.data)
+            return self.read()
+        guess = self.data.qacc_warmstart.copy()  # that the solver begins with; the only state that `mj_forward` changes
+        mujoco.mj_forward(self.model, self.data)
+        reading = self.read()
+        self.data.qacc_warmstart[:] = guess
+        self._hold(target, read_early)
+        mujoco.mj_forward(self.model, self.data)
+        return reading
+
+    def settle(self, target: np.ndarray, physics_steps: int) -> None:
+        """Let a robot that was reset give way under its weight; its time begins afterwards.
+
+        Args:
+            target: of the joints meanwhile [rad], shape (12,).
+            physics_steps: for how long; 0 changes nothing.
+        """
+        if physics_steps:
+            self.step(target, physics_steps)
+            self.data.time = 0.0
+
+    def _hold(self, target: np.ndarray, physics_steps: int) -> None:
+        self._run(self._delay.send(target, physics_steps))
+
+    def _run(self, targets: list[tuple[np.ndarray, int]]) -> None:
+        for held, steps in targets:
             self.data.ctrl[:] = held
             mujoco.mj_step(self.model, self.data, nstep=steps)
-        mujoco.mj_forward(self.model, self.data)
+
+    def ahead(self) -> "Simulation":
+        """The simulation at the time when a target that is commanded now will take effect.
+
+        It shares the model with this one, which stays as it is; the next call overwrites it. Without a delay it is this
+        one.
+        """
+        pending = self._delay.pending()
+        if not pending:
+            return self
+        if self._scratch is None:  # to make it takes as long as the steps
+            self._scratch = mujoco.MjData(self.model)
+        later = copy.copy(self)
+        later.data = self._scratch
+        mujoco.mj_setState(self.model, later.data, self._integration_state(), _STATE)
+        later._delay = ActionDelay(0)
+        later._run(pending)
+        mujoco.mj_forward(self.model, later.data)
+        return later
 
     def push(self, delta_velocity_w: np.ndarray) -> None:
         """Add to the trunk's linear velocity [m/s], world frame, shape (3,), at once."""
@@ -142,25 +187,53 @@ class Simulation:
         return self.data.sensordata[self._touch] > CONTACT_FORCE
 
     @property
+    def joint_resistance(self) -> tuple[float, float]:
+        """Mean dry friction [N m] and mean damping [N m s/rad] of the joints, beyond those of the model on disk."""
+        friction, damping = (
+            float((getattr(self.model, name)[6:] - self._plain[name][6:]).mean())
+            for name in ("dof_frictionloss", "dof_damping")
+        )
+        return friction, damping
+
+    @property
+    def foot_sink(self) -> float:
+        """How much deeper than the model's the feet of the standing robot sink into the ground [m], by estimate.
+
+        A contact of time constant T and impedance d whose point has the inverse inertia A yields r = d (1 - d) T^2 A f
+        to a force f (MuJoCo's documentation, "Solver parameters"), here a quarter of the weight.
+        """
+        body, d = self.model.geom_bodyid[self._foot_geom], self.model.geom_solimp[self._foot_geom, 1]
+        time, own = (array[self._foot_geom, 0] for array in (self.model.geom_solref, self._plain["geom_solref"]))
+        quarter = self.model.body_mass.sum() * robot.GRAVITY / 4
+        yielding = d * (1.0 - d) * self.model.body_invweight0[body, 0] * quarter
+        return max(float((yielding * (time**2 - own**2)).mean()), 0.0)
+
+    @property
     def stable(self) -> bool:
         """False once the physics has diverged (a non-finite or huge position, velocity or acceleration)."""
         warned = any(self.data.warning[kind].number for kind in _UNSTABLE)
         return not warned and bool(np.isfinite(self.data.qpos).all() and np.isfinite(self.data.qvel).all())
 
     def read(self) -> Reading:
-        """The sensors' readings, without noise."""
+        """The sensors' readings, without noise and faults."""
         values = self.data.sensordata
         return Reading(
             accelerometer=values[self._sensor["accelerometer"]].copy(),
             gyroscope=values[self._sensor["gyroscope"]].copy(),
+            q=self.q,
+            dq=self.v,
             contacts=self.contacts,
+            gravity=-matrix_from_quat(self.data.qpos[3:7])[2],
         )
 
     def snapshot(self) -> np.ndarray:
         """Everything needed to continue to the bit, as one vector: state, targets on their way, physics_params."""
+        return np.concatenate([self._integration_state(), self._delay.waiting.ravel(), self.physics_params.as_vector()])
+
+    def _integration_state(self) -> np.ndarray:
         state = np.empty(mujoco.mj_stateSize(self.model, _STATE))
         mujoco.mj_getState(self.model, self.data, state, _STATE)
-        return np.concatenate([state, self._delay.waiting.ravel(), self.physics_params.as_vector()])
+        return state
 
     def restore(self, snapshot: np.ndarray) -> None:
         """Return to a snapshot of a simulation with the same gains; its physics_params comes with it."""

@@ -9,19 +9,21 @@ import gymnasium
 import numpy as np
 import pytest
 
-from go1_mtl_gym import DomainRandomization, SensorNoise, robot
+from go1_mtl_gym import DomainRandomization, SensorNoise, SensorParams, robot
 from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.sim.domain_randomization import Range
+from go1_mtl_gym.sim.domain_randomization import EpisodeConditions, Range
 from go1_mtl_gym.sim.physics_params import PhysicsParams
 
 RANGES = [each.name for each in dataclasses.fields(DomainRandomization) if each.type == Range]
 NOTHING = DomainRandomization(**dict.fromkeys(RANGES))
 
 
-def draws(randomization: DomainRandomization, number: int, base: PhysicsParams | None = None) -> list:
+def draws(
+    randomization: DomainRandomization, number: int, base: EpisodeConditions | None = None
+) -> list[EpisodeConditions]:
     rng = np.random.default_rng(0)
-    return [randomization.draw(rng, base or PhysicsParams()) for _ in range(number)]
+    return [randomization.draw(rng, base or EpisodeConditions()) for _ in range(number)]
 
 
 # -- Draws -------------------------------------------------------------------------------------------------------------
@@ -29,37 +31,56 @@ def draws(randomization: DomainRandomization, number: int, base: PhysicsParams |
 
 def test_draws_fill_their_ranges_evenly_and_independently():
     default = DomainRandomization()
-    assert len(RANGES) == len(dataclasses.fields(PhysicsParams)) + 1
-    rows = np.array([[*dataclasses.astuple(physics_params), factor] for physics_params, factor in draws(default, 2000)])
-    low, high = np.array([getattr(default, name) for name in RANGES]).T
+    assert len(RANGES) == len(dataclasses.fields(PhysicsParams)) + len(dataclasses.fields(SensorParams)) + 2
+    drawn = [name for name in RANGES if name != "encoder_offset"]  # it shows in the offsets alone
+
+    def figures(one: EpisodeConditions) -> list[float]:
+        others = {"noise": one.noise, "sensor_delay_s": one.sensors.delay_s, "settle_s": one.settle_s}
+        named = dataclasses.asdict(one.physics) | others
+        return [named[name] for name in drawn]
+
+    rows = np.array([figures(one) for one in draws(default, 2000)])
+    low, high = np.array([getattr(default, name) for name in drawn]).T
     level = (rows - low) / (high - low)
     assert (level >= 0).all() and (level <= 1).all()
     np.testing.assert_allclose(level.mean(axis=0), 0.5, atol=4 * np.sqrt(1 / 12 / 2000))
     assert level.min(axis=0).max() < 0.01 and level.max(axis=0).min() > 0.99
-    assert np.abs(np.corrcoef(level.T) - np.eye(len(RANGES))).max() < 0.1
+    assert np.abs(np.corrcoef(level.T) - np.eye(len(drawn))).max() < 0.1
+
+
+def test_every_encoder_errs_by_its_own_share_of_a_magnitude_that_is_drawn():
+    randomization = DomainRandomization(encoder_offset=(0.02, 0.06))
+    offsets = np.array([one.sensors.encoder_offset for one in draws(randomization, 2000)])
+    largest = np.abs(offsets).max(axis=1)
+    assert offsets.shape == (2000, 12) and 0.055 < largest.max() <= 0.06
+    # Of x U(-1, 1) with x in U(.02, .06): the mean square is E[x^2]/3 = (.02^2 + .02 .06 + .06^2)/9.
+    assert (offsets**2).mean() == pytest.approx((0.02**2 + 0.02 * 0.06 + 0.06**2) / 9, rel=0.05)
+    assert np.abs(np.corrcoef(offsets.T) - np.eye(12)).max() < 0.1
 
 
 def test_a_range_of_none_leaves_the_base_and_the_other_draws():
-    base = PhysicsParams(friction=0.3, payload_kg=1.0)
-    all_drawn, some = draws(DomainRandomization(), 20), draws(DomainRandomization(friction=None, noise=None), 20, base)
-    for (physics_params, _), (other, factor) in zip(all_drawn, some):
-        assert other == dataclasses.replace(physics_params, friction=0.3) and factor is None
-    assert draws(NOTHING, 5, base) == [(base, None)] * 5
+    base = EpisodeConditions(PhysicsParams(friction=0.3, payload_kg=1.0), SensorParams((0.01,) * 12))
+    without = DomainRandomization(friction=None, noise=None, encoder_offset=None)
+    for drawn, other in zip(draws(DomainRandomization(), 20), draws(without, 20, base)):
+        assert other.physics == dataclasses.replace(drawn.physics, friction=0.3) and other.noise is None
+        assert other.sensors == SensorParams((0.01,) * 12, drawn.sensors.delay_s)
+    assert draws(NOTHING, 5, base) == [base] * 5
 
 
 def test_a_share_of_the_episodes_is_randomised():
-    base = PhysicsParams(contact_time_s=0.03)
+    base = EpisodeConditions(PhysicsParams(contact_time_s=0.03))
     mixed, every = draws(DomainRandomization(fraction=0.3), 2000, base), draws(DomainRandomization(), 2000, base)
-    drawn = [one for one in mixed if one != (base, None)]
+    drawn = [one for one in mixed if one != base]
     assert len(drawn) / 2000 == pytest.approx(0.3, abs=4 * np.sqrt(0.3 * 0.7 / 2000))
-    assert all(one in ((base, None), other) for one, other in zip(mixed, every)), "the others are as without a share"
-    assert draws(DomainRandomization(fraction=0.0), 50, base) == [(base, None)] * 50
+    assert all(one in (base, other) for one, other in zip(mixed, every)), "the others are as without a share"
+    assert draws(DomainRandomization(fraction=0.0), 50, base) == [base] * 50
 
 
 def test_a_range_of_one_point_gives_it():
-    ranges = {"friction": (0.7, 0.7), "motor_strength": (1.5, 1.5), "noise": (0.0, 0.0)}
-    for physics_params, factor in draws(dataclasses.replace(NOTHING, **ranges), 20):
-        assert physics_params == PhysicsParams(friction=0.7, motor_strength=1.5) and factor == 0.0
+    points = {"friction": 0.7, "motor_strength": 1.5, "noise": 0.0, "sensor_delay_s": 0.01, "settle_s": 0.2}
+    expected = EpisodeConditions(PhysicsParams(friction=0.7, motor_strength=1.5), SensorParams(delay_s=0.01), 0.0, 0.2)
+    ranges = {name: (point, point) for name, point in points.items()}
+    assert draws(dataclasses.replace(NOTHING, **ranges), 20) == [expected] * 20
 
 
 def test_it_survives_json():
@@ -78,6 +99,10 @@ def test_it_survives_json():
         ({"joint_friction": 0.5}, r"range of joint_friction must have shape \(2,\)"),
         ({"rotor_inertia": (0.0, float("nan"))}, "range of rotor_inertia must be finite"),
         ({"contact_time_s": ("soft", "stiff")}, "range of contact_time_s must be 2 numbers.*soft"),
+        ({"joint_damping": (0.0, 4.0)}, "joint_damping.*got 4"),
+        ({"encoder_offset": (-0.01, 0.01)}, r"sensor encoder_offset \[rad\] must lie in \[0, 0.5\], got -0.01"),
+        ({"sensor_delay_s": (0.0, 0.1)}, r"sensor delay_s \[s\] must lie in \[0, 0.05\], got 0.1"),
+        ({"settle_s": (0.0, 11.0)}, r"settle_s \[s\] must lie in \[0, 10\], got 11"),
         ({"noise": (-1.0, 1.0)}, "factor on the sensor noise.*got -1"),
         ({"fraction": 1.5}, r"fraction of randomized episodes must lie in \[0, 1\], got 1.5"),
     ],
@@ -115,17 +140,18 @@ def test_the_model_is_the_drawn_one():
         np.testing.assert_allclose(model.actuator_gainprm[:, 0], 40.0 * physics_params.motor_strength)
         assert (model.dof_armature[6:] == physics_params.rotor_inertia).all()
         assert (model.dof_frictionloss[6:] == physics_params.joint_friction).all()
+        assert (model.dof_damping[6:] == physics_params.joint_damping).all()
         assert model.geom_solref[model.geom("FL_foot").id, 0] == physics_params.contact_time_s
         assert (
             len(env.simulation.snapshot())
             == len(Go1Env("trot").simulation.snapshot()) + 12 * physics_params.delay_steps
         )
-        assert env.simulation.feet_w[:, 2].min() == pytest.approx(robot.FOOT_RADIUS)
 
 
-@pytest.mark.parametrize("kwargs", [{}, {"estimator_noise": True}])
+@pytest.mark.parametrize("kwargs", [{}, {"estimator_noise": True}, {"sensors": SensorParams(0.02)}])
 def test_command_and_pose_after_a_reset_are_those_without_randomization(kwargs):
-    env, plain = Go1Env(None, randomization=True, **kwargs), Go1Env(None, **kwargs)
+    randomization = DomainRandomization(settle_s=None)
+    env, plain = Go1Env(None, randomization=randomization, **kwargs), Go1Env(None, **kwargs)
     for seed in range(4):
         (_, info), (_, expected) = env.reset(seed=seed), plain.reset(seed=seed)
         assert info.keys() == expected.keys() and info["task"] == expected["task"]
@@ -148,6 +174,16 @@ def test_without_randomization_a_reset_leaves_the_model_alone():
     env.simulation.model.geom_friction[:, 0] = 0.3  # an experiment of the user's
     env.reset(seed=0)
     assert (env.simulation.model.geom_friction[:, 0] == 0.3).all()
+
+
+def test_a_randomised_robot_has_stood_for_a_time_of_its_own():
+    env = Go1Env("trot", randomization=dataclasses.replace(NOTHING, settle_s=(0.1, 0.5), fraction=0.5))
+    plain = Go1Env("trot")
+    moved = []
+    for seed in range(20):
+        env.reset(seed=seed), plain.reset(seed=seed)
+        moved.append(not np.array_equal(env.state.q, plain.state.q))
+    assert 3 < sum(moved) < 17
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from go1_mtl_gym import GAITS, TASKS, robot
+from go1_mtl_gym import GAITS, TASKS, InvalidInputError, robot
 from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.episode import COMMAND_SLEW, filtered
 from go1_mtl_gym.gaits import STAND_COMMAND
@@ -134,3 +134,42 @@ def test_asking_for_the_present_task_leaves_its_clock_alone():
         *_, info = env.step(home(env))
         env.set_task("trot")
     assert env.state.phase == info["phase"] == pytest.approx(3 * 0.02 / 0.4)
+
+
+# -- Settling ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("task", ["trot", "bound"])  # one that can stand, and one that cannot
+def test_an_episode_that_settles_begins_where_standing_on_action_zero_has_led(task):
+    options = {"command": (0.2, 0.0, 0.0)}
+    env, stood = Go1Env(task, settle_s=0.4, kp=30.0, contact_time_s=0.1), Go1Env(task, kp=30.0, contact_time_s=0.1)
+    observation, info = env.reset(seed=1, options=options)
+    stood.reset(seed=1, options=options)
+    for _ in range(20):
+        stood.step(np.zeros(12))
+    np.testing.assert_allclose(env.state.q, stood.state.q, atol=1e-9)
+    np.testing.assert_allclose(env.state.position_w, stood.state.position_w, atol=1e-9)
+    sunk = Go1Env(task, kp=30.0, contact_time_s=0.1).reset(seed=1)[0]
+    assert observation[env.layout.slices["contacts"]].all() and not sunk[env.layout.slices["contacts"]].all()
+    assert (info["phase"], env.state.time_s, env.simulation.data.time) == (0.0, 0.0, 0.0)
+    assert not info["filtered_command"].any() and not observation[env.layout.slices["last_action"]].any()
+
+
+def test_a_delayed_target_arrives_while_the_robot_settles():
+    env = Go1Env("trot", settle_s=0.1, action_delay_s=0.05)
+    env.reset(seed=0)
+    np.testing.assert_array_equal(env.simulation.data.ctrl, robot.HOME_POSE)
+    assert (env.simulation.snapshot()[-12 * 50 - 8 : -8].reshape(50, 12) == robot.HOME_POSE).all()
+
+
+def test_a_settled_episode_has_its_full_length_and_the_commands_of_any_other():
+    env, plain = Go1Env(None, settle_s=0.3, episode_s=0.1), Go1Env(None)
+    (_, info), (_, expected) = env.reset(seed=6), plain.reset(seed=6)
+    assert info["task"] == expected["task"] and (info["command"] == expected["command"]).all()
+    assert [env.step(np.zeros(12))[3] for _ in range(5)] == [False] * 4 + [True]
+
+
+@pytest.mark.parametrize("settle_s", [-0.1, 10.5, "long", None])
+def test_an_impossible_time_to_settle_is_refused(settle_s):
+    with pytest.raises(InvalidInputError, match=rf"settle_s \[s\] must .*{settle_s}"):
+        Go1Env(settle_s=settle_s)

@@ -2,9 +2,10 @@
 
 import mujoco
 import numpy as np
+import pytest
 
 from go1_mtl_gym import robot
-from go1_mtl_gym.kinematics import contact_points
+from go1_mtl_gym.kinematics import contact_points, leg_kinematics
 
 
 def test_points_and_velocities_are_mujocos():
@@ -38,3 +39,19 @@ def test_the_velocity_is_the_materials():
     # The lowest point of a turning ball moves with its centre; the material there moves by omega x r more.
     expected = np.cross([0.0, 2.0, 0.0], -robot.FOOT_RADIUS * up)
     np.testing.assert_allclose(velocity - (after - before) / step, np.tile(expected, (4, 1)), atol=1e-5)
+
+
+def test_leg_kinematics_tell_the_velocity_of_the_trunk_over_feet_that_stand_still():
+    """A trunk with velocity v and turn w: a foot at p that stands still moves with -(v + w x p) against the trunk."""
+    rng = np.random.default_rng(5)
+    q, w, v = robot.HOME_POSE + rng.uniform(-0.3, 0.3, 12), rng.normal(size=3), rng.normal(size=3)
+    feet = leg_kinematics(q, np.zeros(12), np.zeros(3))[:12].reshape(4, 3)
+    step = 1e-6
+    jacobian = np.stack(
+        [(leg_kinematics(q + step * e, np.zeros(12), np.zeros(3))[:12] - feet.ravel()) / step for e in np.eye(12)],
+        axis=1,
+    )
+    dq = np.linalg.solve(jacobian, -(v + np.cross(w, feet)).ravel())
+    told = leg_kinematics(q, dq, w)
+    assert told[:12].reshape(4, 3) == pytest.approx(feet)
+    assert told[12:].reshape(4, 3) == pytest.approx(np.tile(v, (4, 1)), abs=1e-4)

@@ -8,7 +8,7 @@ from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PDGains
 from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.sim.physics_params import PAYLOAD_SIDE, ActionDelay, PhysicsParams
+from go1_mtl_gym.sim.physics_params import ActionDelay, PhysicsParams
 from go1_mtl_gym.sim.simulation import Simulation
 
 
@@ -68,7 +68,7 @@ def test_a_payload_adds_its_mass_and_the_inertia_of_a_cube_to_the_trunk():
     mass, inertia = loaded.body_mass - plain.body_mass, loaded.body_inertia - plain.body_inertia
     assert loaded.body_mass.sum() == pytest.approx(robot.MASS + 3.0) and mass[trunk] == pytest.approx(3.0)
     np.testing.assert_allclose(inertia[trunk], 3.0 * 0.1**2 / 6)  # m s^2 / 6 = .005 kg m^2
-    assert PAYLOAD_SIDE == 0.1
+    assert robot.PAYLOAD_SIDE == 0.1
     assert not np.delete(mass, trunk).any() and not np.delete(inertia, trunk, axis=0).any()
 
 
@@ -139,6 +139,22 @@ def test_dry_friction_brakes_a_turning_joint_whatever_its_speed(friction):
         simulation.data.qvel[6] = speed
         mujoco.mj_forward(simulation.model, simulation.data)
         assert simulation.data.qfrc_constraint[6] == pytest.approx(-np.sign(speed) * friction)
+
+
+def test_damping_is_that_of_every_joint_and_of_nothing_else():
+    assert changed(PhysicsParams(joint_damping=0.7)) == {"dof_damping"}
+    model = Simulation(PDGains(), PhysicsParams(joint_damping=0.7)).model
+    assert model.dof_damping.tolist() == [0.0] * 6 + [0.7] * 12
+    assert not Simulation(PDGains(), PhysicsParams(joint_damping=0.0)).model.dof_damping.any()
+
+
+def test_damping_brakes_a_turning_joint_in_proportion_to_its_speed():
+    simulation = Simulation(PDGains(), PhysicsParams(joint_damping=0.7))
+    simulation.reset(robot.HOME_POSE)
+    for speed in (5.0, -15.0):
+        simulation.data.qvel[6] = speed
+        mujoco.mj_forward(simulation.model, simulation.data)
+        assert simulation.data.qfrc_damper[6] == pytest.approx(-0.7 * speed)
 
 
 def test_rotor_inertia_is_that_of_every_joint_and_what_follows_alone():
@@ -244,7 +260,8 @@ def test_a_reset_forgets_the_targets_on_their_way():
         ({"motor_strength": None}, "motor_strength.*None"),
         ({"joint_friction": -0.1}, r"joint_friction \[N m\] must lie in \[0, 5\], got -0.1"),
         ({"rotor_inertia": 1.0}, r"rotor_inertia \[kg m\^2\] must lie in \[0, 0.1\], got 1"),
-        ({"contact_time_s": 0.001}, r"contact_time_s \[s\] must lie in \[0.002, 0.1\], got 0.001"),
+        ({"contact_time_s": 0.001}, r"contact_time_s \[s\] must lie in \[0.002, 0.2\], got 0.001"),
+        ({"joint_damping": 3.5}, r"joint_damping \[N m s/rad\] must lie in \[0, 3\], got 3.5"),
         ({"gravity": 1.6}, "argument of Go1Env must be one of 'task', .*'kp'.*'friction'.*; got 'gravity'"),
         ({"estimator_noise": 0.1}, "estimator_noise must be None, True, False or an EstimatorNoise, got 0.1"),
     ],

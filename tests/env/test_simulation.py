@@ -10,7 +10,7 @@ from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.sim.physics_params import PhysicsParams
 from go1_mtl_gym.sim.simulation import CONTACT_FORCE, PHYSICS_HZ, Simulation
 
-EVERYTHING = PhysicsParams(0.5, 2.0, 0.012, 0.9, 0.6, 0.02, 0.01)
+EVERYTHING = PhysicsParams(0.5, 2.0, 0.012, 0.9, 0.6, 0.02, 0.01, 0.7)
 
 
 @pytest.fixture
@@ -184,6 +184,6 @@ def test_a_snapshot_brings_its_physics_params_along():
 
 
 def test_a_physics_params_is_a_vector_and_back():
-    assert PhysicsParams().as_vector().tolist() == [-1.0, 0.0, 0.0, 1.0, -1.0, -1.0, -1.0]
+    assert PhysicsParams().as_vector().tolist() == [-1.0, 0.0, 0.0, 1.0, -1.0, -1.0, -1.0, -1.0]
     for physics_params in (PhysicsParams(), EVERYTHING, PhysicsParams(joint_friction=0.0)):
         assert PhysicsParams.from_vector(physics_params.as_vector()) == physics_params

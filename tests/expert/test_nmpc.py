@@ -9,6 +9,7 @@ import pytest
 from experts import NMPCConfig, NMPCExpert
 from experts.mpc.controller import Solution
 from experts.mpc.srbd import FORCE_UNIT
+from experts.whole_body.joint_resistance import joint_resistance
 from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PDGains
 from go1_mtl_gym.errors import InvalidInputError
@@ -222,3 +223,19 @@ def test_impossible_settings_are_refused(setting, words):
 def test_impossible_holds_are_refused(hold_s):
     with pytest.raises(InvalidInputError, match="hold_s"):
         NMPCExpert(hold_s=hold_s)
+
+
+def test_a_target_is_for_the_motors_strength_and_the_joints_resistance(expert, standing):
+    torque, acceleration = expert.torque(standing)
+    half = expert.hold_s / 2
+    q, v = standing.q + half * standing.v + half**2 / 2 * acceleration, standing.v + half * acceleration
+    told = replace(standing, motor_strength=0.8, joint_friction=0.3, joint_damping=0.4)
+    applied = 0.8 * expert.gains.torque(expert.action(told), q, v)
+    np.testing.assert_allclose(applied, torque + joint_resistance(told, v), atol=1e-9)
+
+
+def test_told_of_a_payload_it_pushes_with_the_weight_of_both(expert, standing):
+    loaded = replace(standing, payload_kg=3.0)
+    lifting = [expert.forces(state, expert._model.dynamics(state))[:, 2].sum() for state in (standing, loaded)]
+    assert lifting[1] - lifting[0] == pytest.approx(3.0 * robot.GRAVITY, rel=0.15)
+    np.testing.assert_array_equal(expert.action(standing), fresh(standing).action(standing))

@@ -121,6 +121,20 @@ def moved(model: RobotModel, state: RobotState, seconds: float) -> RobotState:
     return replace(there, linear_velocity_w=there.rotation @ v[:3])
 
 
+def test_a_payload_is_mujocos_and_is_put_down_again(model):
+    loaded = Go1Env("trot", payload_kg=2.5)
+    loaded.reset(seed=0)
+    state, data = replace(loaded.state, payload_kg=2.5), loaded.simulation.data
+    dynamics, before = model.dynamics(state), model.dynamics(loaded.state)
+    mass = full_mass_matrix(loaded.simulation.model, data)
+    np.testing.assert_allclose(dynamics.mass_matrix, mass, atol=1e-9)  # the trunk is level
+    np.testing.assert_allclose(dynamics.com_w, data.subtree_com[loaded.simulation.model.body("trunk").id], atol=1e-9)
+    assert dynamics.mass == pytest.approx(loaded.simulation.model.body_mass.sum())
+    assert np.abs(before.mass_matrix - mass).max() > 1.0 and before.mass == robot.MASS
+    np.testing.assert_array_equal(RobotModel().dynamics(loaded.state).mass_matrix, before.mass_matrix)
+    assert model.standing_moments(2.5)[1] > model.standing_moments()[1]
+
+
 def test_mean_omega_is_mujocos_angular_momentum_over_the_inertia(model, env):
     rng, m, data = np.random.default_rng(4), env.simulation.model, env.simulation.data
     for _ in range(20):
@@ -173,7 +187,7 @@ def test_drift_is_the_feets_acceleration_at_zero_vdot(model, env):
 def test_evaluations_do_not_share_memory_with_the_model(model, env):
     rng = np.random.default_rng(3)
     first = model.dynamics(random_state(env, rng))
-    kept = {name: getattr(first, name).copy() for name in first.__dataclass_fields__}
+    kept = {name: np.copy(getattr(first, name)) for name in first.__dataclass_fields__}
     model.dynamics(random_state(env, rng))
     for name, value in kept.items():
         np.testing.assert_array_equal(getattr(first, name), value)

@@ -180,6 +180,26 @@ def test_trots_at_other_rates(control_hz):
     np.testing.assert_allclose(np.mean(velocity[-2 * control_hz // 5 :], axis=0), COMMAND, atol=0.12)
 
 
+@pytest.mark.parametrize(
+    ("task", "physics"),
+    [
+        ("pace", {"action_delay_s": 0.02}),
+        ("bound", {"payload_kg": 3.0}),
+        ("walk", {"joint_friction": 1.0, "joint_damping": 1.0, "contact_time_s": 0.1, "action_delay_s": 0.012}),
+        ("trot", {"payload_kg": 2.0, "motor_strength": 0.9, "action_delay_s": 0.033}),
+    ],
+)
+def test_a_privileged_expert_walks_under_what_it_is_told_of(task, physics):
+    env = Go1Env(task, privileged=True, **physics)
+    env.reset(seed=2, options={"command": COMMAND})
+    velocity = []
+    for _ in range(STEPS):
+        _, _, terminated, _, info = env.step(env.expert_action())
+        assert not terminated
+        velocity.append(info["base_velocity"])
+    np.testing.assert_allclose(np.mean(velocity[SETTLED:], axis=0), COMMAND, atol=0.08)
+
+
 @pytest.mark.parametrize("task", ["trot", "jump"])
 def test_asking_the_expert_has_no_side_effects(task):
     asked, driven = Go1Env(task, noise=True), Go1Env(task, noise=True)

@@ -1,5 +1,7 @@
 """The robot in a mirror."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -82,10 +84,17 @@ def test_rows_and_images_keep_their_weights(rows):
     assert (together == np.concatenate([weights, weights[has_image]])).all()
 
 
-def test_what_has_no_image_is_refused():
-    rows = trainers.collect("trot", seconds=0.2, env_kwargs={"history": 2})
-    with pytest.raises(InvalidInputError, match="one frame"):
-        mirrored(rows)
+def test_older_frames_are_mirrored_like_the_newest():
+    rows = trainers.collect("trot", seconds=0.6, env_kwargs={"history": 3})
+    image, where = mirrored(rows), rows.contract.slices["history"]
+    assert image.obs[1:, where][:, :34] == pytest.approx(image.obs[:-1, :34])
+    assert image.obs[2:, where][:, 34:] == pytest.approx(image.obs[:-2, :34])
+
+
+def test_rows_of_an_unknown_gait_have_no_image(rows):
+    unknown = dataclasses.replace(rows.contract, gaits=(None,) * len(rows.tasks))
+    with pytest.raises(InvalidInputError, match="names the gaits"):
+        mirrored(dataclasses.replace(rows, contract=unknown))
 
 
 def test_cloning_learns_from_images_too(rows):

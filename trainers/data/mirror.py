@@ -7,6 +7,7 @@ import numpy as np
 from go1_mtl_gym.contract import PolicyContract
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.gaits import STAND_COMMAND, Gait
+from go1_mtl_gym.sensing.observation import FRAME_SIZE
 from trainers.data.demonstrations import Demonstrations
 
 OTHER_SIDE = np.array([1, 0, 3, 2])
@@ -41,17 +42,15 @@ def mirrored(rows: Demonstrations) -> Demonstrations:
     phase 0 in the mirror too.
 
     Args:
-        rows: with one frame of proprioception, and tasks whose gaits the contract names.
+        rows: with tasks whose gaits the contract names.
 
     Returns:
         Rows of those tasks whose gait is the same in the mirror, in order.
 
     Raises:
-        InvalidInputError: if rows hold more frames, or a task's gait is not known.
+        InvalidInputError: if a task's gait is not known.
     """
     contract = rows.contract
-    if contract.history != 1:
-        raise InvalidInputError(f"rows with one frame of proprioception were expected, got {contract.history}")
     shifts = np.array([np.nan if (shift := mirror_shift(gait)) is None else shift for gait in _gaits(contract)])
     rows = rows.take(np.isfinite(shifts[rows.task]))
     return dataclasses.replace(
@@ -81,19 +80,35 @@ def _gaits(contract: PolicyContract) -> list[Gait]:
 
 def _mirrored_obs(obs: np.ndarray, contract: PolicyContract, shift: np.ndarray) -> np.ndarray:
     image, where = obs.copy(), contract.slices
-    for name, sign in (("accelerometer", _TRUE), ("gyroscope", _AXIAL), ("gravity", _TRUE), ("command", _COMMAND)):
+    frames = [0, *range(where["history"].start, where["history"].stop, FRAME_SIZE)] if "history" in where else [0]
+    for start in frames:
+        image[:, start : start + FRAME_SIZE] = _mirrored_frame(obs[:, start : start + FRAME_SIZE], contract)
+    for name, sign in (("gravity", _TRUE), ("command", _COMMAND)):
         if name in where:
             image[:, where[name]] *= sign.astype(np.float32)
-    for name in ("q", "dq", "last_action"):
-        if name in where:
-            image[:, where[name]] = _mirrored_joints(obs[:, where[name]])
-    image[:, where["contacts"]] = obs[:, where["contacts"]][:, OTHER_SIDE]
+    if "last_action" in where:
+        image[:, where["last_action"]] = _mirrored_joints(obs[:, where["last_action"]])
     if "leg_kinematics" in where:
         feet = obs[:, where["leg_kinematics"]].reshape(-1, 2, 4, 3)[:, :, OTHER_SIDE] * _TRUE
         image[:, where["leg_kinematics"]] = feet.reshape(len(obs), -1)
     if "phase" in where:
         image[:, where["phase"]] = _turned(obs[:, where["phase"]], np.where(_rests(obs, contract), 0.0, shift))
     return image
+
+
+def _mirrored_frame(frame: np.ndarray, contract: PolicyContract) -> np.ndarray:
+    """One frame of proprioception, shape (n, 34)."""
+    where = contract.slices
+    return np.concatenate(
+        [
+            frame[:, where["accelerometer"]] * _TRUE,
+            frame[:, where["gyroscope"]] * _AXIAL,
+            _mirrored_joints(frame[:, where["q"]]),
+            _mirrored_joints(frame[:, where["dq"]]),
+            frame[:, where["contacts"]][:, OTHER_SIDE],
+        ],
+        axis=1,
+    )
 
 
 def _rests(obs: np.ndarray, contract: PolicyContract) -> np.ndarray:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from go1_mtl_gym import BUILT_IN_TASKS, DomainRandomization
+from go1_mtl_gym.env_config import DEFAULT_CHANNELS
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.sensing.observation import CHANNELS
 from go1_mtl_gym.tasks import check_task_names
@@ -53,12 +54,12 @@ class JobConfig:
         history: proprioceptive frames in the observation.
         control_hz: rate of the policy [Hz].
         kp, kd: gains of the actuators [N m/rad, N m s/rad].
-        clean_s, perturbed_s, hard_push_s, held_out_s: demonstrations: undisturbed, perturbed, perturbed and pushed
-            hard, and undisturbed for the R2.
+        clean_s, perturbed_s, hard_push_s, randomized_s, held_out_s: demonstrations: undisturbed, perturbed, perturbed
+            and pushed hard, perturbed with physics and sensors that are drawn, and undisturbed for the R2.
         operator: whose hands drive in perturbed demonstrations, rounds and evaluation; None draws commands and gaits.
         hard_push_interval: mean time between pushes at the edge of what the expert bears in `hard_push_s` [s]; in
             rounds they come half as often. None pushes hard nowhere.
-        randomized: fraction of the perturbed episodes whose physics and sensor noise are drawn, by the ranges of
+        randomized: fraction of the episodes in rounds whose physics and sensors are drawn, by the ranges of
             `go1_mtl_gym.DomainRandomization`.
         task_interval: shortest and longest time between changes of gait in perturbed episodes without an operator, or
             None.
@@ -66,7 +67,7 @@ class JobConfig:
         mirror: whether to learn from the mirror image of every row too.
         shard_s: length of a shard, which begins with a standing start.
         dagger_s: recorded in each DAgger round.
-        takeover_rad: of the DAgger rounds, see `trainers.DAggerConfig`.
+        takeover_rad, round_weight: of the DAgger rounds, see `trainers.DAggerConfig`.
         width: units of each hidden layer.
         normalization: of inputs and outputs, see `trainers.MultiHeadPolicy`.
         batch_size: rows per gradient step.
@@ -90,14 +91,15 @@ class JobConfig:
     n_envs: int = _from(1, os.cpu_count() or 1)
     device: str = "cpu"
     threads: int = _from(1, 1)
-    channels: tuple[str, ...] = ("command", "phase", "last_action")
+    channels: tuple[str, ...] = DEFAULT_CHANNELS
     history: int = _from(1, 1)
     control_hz: int = _from(1, 50)
     kp: float = _from(0, 50.0, above=True)
     kd: float = _from(0, 2.0)
     clean_s: float = _from(0, 60.0)
-    perturbed_s: float = _from(0, 300.0)
+    perturbed_s: float = _from(0, 210.0)
     hard_push_s: float = _from(0, 90.0)
+    randomized_s: float = _from(0, 90.0)
     operator: OperatorConfig | None = OperatorConfig()
     hard_push_interval: float | None = _from(0, 4.0, above=True)
     held_out_s: float = _from(0, 60.0, above=True)
@@ -107,7 +109,8 @@ class JobConfig:
     mirror: bool = True
     shard_s: float = _from(0, 15.0, above=True)
     dagger_s: float = _from(0, 60.0, above=True)
-    takeover_rad: float | None = _from(0, None, above=True)
+    takeover_rad: float | None = _from(0, 0.2, above=True)
+    round_weight: int = _from(1, 2)
     width: int = _from(1, 256)
     normalization: str = "mean_std"
     batch_size: int = _from(1, 1024)
@@ -180,10 +183,13 @@ class JobConfig:
         """Of the paper-literal policy: the 34 numbers and the task id."""
         return self.env_kwargs | {"channels": (), "history": 1}
 
-    @property
-    def randomization_kwargs(self) -> dict[str, Any]:
-        """What environments of perturbed episodes and of rounds have on top of `env_kwargs`."""
-        return {"randomization": DomainRandomization(fraction=self.randomized)} if self.randomized else {}
+    @staticmethod
+    def randomization_kwargs(fraction: float) -> dict[str, Any]:
+        """What environments have on top of `env_kwargs` if a fraction of their episodes is randomized.
+
+        Their expert is told what was drawn; the student must find out.
+        """
+        return {"randomization": DomainRandomization(fraction=fraction), "privileged": True} if fraction else {}
 
     def perturbation(self, noise_rad: float, hard_push_interval: float | None = None) -> PerturbationConfig:
         """How an episode is perturbed.
@@ -231,7 +237,7 @@ class JobConfig:
             batch_size=self.batch_size,
             log_interval=interval,
             seed=self.seed,
-            mirror=self.mirror and self.history == 1,
+            mirror=self.mirror,
         )
 
     @property
@@ -247,7 +253,12 @@ class JobConfig:
     @property
     def dagger(self) -> DAggerConfig:
         """How to collect a DAgger round."""
-        return DAggerConfig(seconds_per_task=self.dagger_s, takeover_rad=self.takeover_rad, seed=self.seed)
+        return DAggerConfig(
+            seconds_per_task=self.dagger_s,
+            takeover_rad=self.takeover_rad,
+            round_weight=self.round_weight,
+            seed=self.seed,
+        )
 
     @property
     def phase(self) -> PhaseConfig:
@@ -261,7 +272,7 @@ class JobConfig:
 
 def _number(value: Any, field: "dataclasses.Field[Any]") -> int | float | None:
     """A field's value as Python's own number, checked against the field's lower bound."""
-    if value is None and field.default is None:
+    if value is None and "None" in str(field.type):
         return None
     low, above = field.metadata["low"], field.metadata["above"]
     kind = "an integer" if field.type is int else "a number"

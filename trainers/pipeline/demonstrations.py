@@ -34,14 +34,13 @@ def shard_jobs(
 
 
 def training_jobs(config: JobConfig) -> list[CollectJob]:
-    """Shards to learn from: clean ones, then perturbed ones with drawn physics, then those that are pushed hard."""
-    clean = shard_jobs(config, config.clean_s, 0)
+    """Shards to learn from: clean ones, perturbed ones, those that are pushed hard, and those with drawn physics."""
     perturbation = config.perturbation(NOISE_RAD)
-    perturbed = shard_jobs(config, config.perturbed_s, 1, perturbation, config.randomization_kwargs)
-    if config.operator is None or config.hard_push_interval is None:
-        return clean + perturbed
-    hard = config.perturbation(NOISE_RAD, config.hard_push_interval)
-    return clean + perturbed + shard_jobs(config, config.hard_push_s, 3, hard, config.randomization_kwargs)
+    jobs = shard_jobs(config, config.clean_s, 0) + shard_jobs(config, config.perturbed_s, 1, perturbation)
+    if config.operator is not None and config.hard_push_interval is not None:
+        hard = config.perturbation(NOISE_RAD, config.hard_push_interval)
+        jobs += shard_jobs(config, config.hard_push_s, 3, hard)
+    return jobs + shard_jobs(config, config.randomized_s, 4, perturbation, config.randomization_kwargs(1.0))
 
 
 def held_out_jobs(config: JobConfig) -> list[CollectJob]:

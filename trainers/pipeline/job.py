@@ -30,6 +30,11 @@ from trainers.policies.multi_head import MultiHeadPolicy
 from trainers.utils.files import json_ready, write_json
 from trainers.utils.logging import log_figure, log_round, log_text, make_logger
 
+DRAWN, OPERATOR = "drawn", "operator"
+"""Where commands come from in the closed loop: the task's range, or hands."""
+IN_HANDS = ("success_rate", "survival_rate", "velocity_error")
+"""What ``metrics.json`` tells of the episodes in an operator's hands."""
+
 
 class Job:
     """One training run in one folder.
@@ -132,7 +137,7 @@ class Job:
     def _venv(self) -> Iterator[VecEnv]:
         """One environment per task, as DAgger rounds want them."""
         config = self.config
-        kwargs = config.env_kwargs | config.randomization_kwargs
+        kwargs = config.env_kwargs | config.randomization_kwargs(config.randomized)
         venv = make_venv(config.tasks, 1, kwargs, config.round_perturbation, subproc=config.n_envs > 1)
         try:
             yield venv
@@ -144,7 +149,8 @@ class Job:
         """A quick look at the closed loop and the one-step errors, for TensorBoard."""
         agent = f"round-{round_num}"
         episodes = self.config.round_episodes
-        closed_loop = {task: self.closed_loop(policy, agent, task, episodes) for task in self.config.tasks}
+        protocol = DRAWN if self.config.operator is None else OPERATOR
+        closed_loop = {task: self.closed_loop(policy, agent, task, episodes, protocol) for task in self.config.tasks}
         log_round(self.logger, round_num, closed_loop, offline_metrics(policy, held_out))
 
     def phase_free(self, policy: MultiHeadPolicy) -> dict[str, Any]:
@@ -162,7 +168,7 @@ class Job:
                     config=config.phase,
                     seed=config.seed,
                     progress=self.progress,
-                    **config.randomization_kwargs,
+                    **config.randomization_kwargs(config.randomized),
                 )
             phase_free.save(path)
         return {"phase_free": load(path)}
@@ -189,8 +195,7 @@ class Job:
         with self.folder.stage("evaluation"):
             for name, policy in {"expert": "expert", **policies}.items():
                 for task in self.config.tasks:
-                    scores = self.closed_loop(policy, name, task, self.config.episodes)
-                    tasks[task].setdefault(name, {}).update(scores)
+                    tasks[task].setdefault(name, {}).update(self._scores(policy, name, task))
         metrics = {
             "tasks": tasks,
             "config": self.config.as_dict(),
@@ -215,7 +220,16 @@ class Job:
                 tasks[task][name] = scores
         return tasks
 
-    def closed_loop(self, policy: Any, agent: str, task: str, episodes: int) -> dict[str, Any]:
+    def _scores(self, policy: Any, agent: str, task: str) -> dict[str, Any]:
+        """With drawn commands; and, by names that begin with "operator", in an operator's hands, if there is one."""
+        episodes = self.config.episodes
+        scores = self.closed_loop(policy, agent, task, episodes, DRAWN)
+        if self.config.operator is None:
+            return scores
+        hands = self.closed_loop(policy, agent, task, episodes, OPERATOR)
+        return scores | {f"{OPERATOR}_{name}": hands[name] for name in IN_HANDS}
+
+    def closed_loop(self, policy: Any, agent: str, task: str, episodes: int, protocol: str = DRAWN) -> dict[str, Any]:
         """Scores of `trainers.evaluate`, kept on disk; "episodes" is their number.
 
         Args:
@@ -223,24 +237,27 @@ class Job:
             agent: its name in the run.
             task: name of the task.
             episodes: how many.
+            protocol: `DRAWN`, commands that change at times, or `OPERATOR`, the hands of the configuration in one gait.
         """
-        path = self.folder.closed_loop(agent, task)
+        path = self.folder.closed_loop(agent, task, protocol)
         known = read_json(path)
         if known is None:
-            known = self._measured(policy, task, episodes) | {"learner": agent}
+            known = self._measured(policy, task, episodes, protocol) | {"learner": agent}
             write_json(path, known)
         kept = {key: value for key, value in known.items() if key not in ("task", "learner", "episodes", "seconds")}
         return kept | {"episodes": len(known["episodes"])}
 
-    def _measured(self, policy: Any, task: str, episodes: int) -> dict[str, Any]:
+    def _measured(self, policy: Any, task: str, episodes: int, protocol: str) -> dict[str, Any]:
         config = self.config
+        operated = protocol == OPERATOR and config.operator is not None
         result = evaluate(
             policy,
             task,
             episodes=episodes,
             seconds=config.episode_s,
             seed=config.seed + 1,
-            command_interval=config.command_interval,
+            command_interval=None if operated else config.command_interval,
+            operator=config.operator.of_one_gait() if operated and config.operator else None,
             n_jobs=config.n_envs,
             progress=self.progress,
             **(config.env_kwargs if policy == "expert" else {}),

@@ -64,9 +64,9 @@ class RunFolder:
         """The log."""
         return self.path / "tensorboard"
 
-    def closed_loop(self, agent: str, task: str) -> Path:
+    def closed_loop(self, agent: str, task: str, protocol: str) -> Path:
         """Scores of one agent in one task."""
-        return self.parts / "closed_loop" / f"{agent}-{task}.json"
+        return self.parts / "closed_loop" / f"{agent}-{task}-{protocol}.json"
 
     # -- Housekeeping --------------------------------------------------------------------------------------------------
 

@@ -22,6 +22,7 @@ RESULT_COLUMNS = {
     "survival": ("survival_rate", "share"),
     "velocity error [m/s]": ("velocity_error", ".3f"),
     "steps/s": ("step_rate", ".2f"),
+    "in hands": ("operator_success_rate", "share"),
 }
 """Header -> key in ``metrics.json`` and how its value is written."""
 PAPER_R2 = {

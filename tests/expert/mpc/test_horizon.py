@@ -57,3 +57,10 @@ def test_the_reference_turns_the_nominal_forces(driven):
     yaw = posed(state).reference[:-1, 2] - posed(straight).reference[:-1, 2]
     np.testing.assert_allclose(turned, ahead * np.exp(1j * yaw)[:, None], atol=1e-12)
     np.testing.assert_allclose(yaw, 0.8 * posed(state).dt * np.arange(STEPS), atol=1e-12)
+
+
+def test_nominal_forces_carry_the_payload(standing):
+    loaded = posed(replace(standing, payload_kg=3.0))
+    lifting = loaded.nominal.reshape(STEPS, 4, 3)[:, :, 2].sum(axis=1) * FORCE_UNIT
+    np.testing.assert_allclose(lifting, (robot.MASS + 3.0) * robot.GRAVITY, rtol=1e-3)
+    assert loaded.mass == robot.MASS + 3.0

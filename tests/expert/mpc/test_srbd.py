@@ -189,3 +189,12 @@ def test_intervals_do_not_mix():
         alone = linearize(states[k : k + 2], inputs[k : k + 1], feet[k : k + 1], INERTIA_B, 0.02)
         for name in ("A", "B", "c"):
             np.testing.assert_allclose(getattr(together, name)[k], getattr(alone, name)[0], atol=1e-13)
+
+
+def test_a_heavier_body_is_accelerated_less_by_its_feet_and_as_much_by_gravity():
+    x = np.array([POINT, POINT])
+    light = linearize(x, INPUT[None], FEET[None], INERTIA_B, 0.01)
+    heavy = linearize(x, INPUT[None], FEET[None], INERTIA_B, 0.01, 2 * robot.MASS)
+    np.testing.assert_allclose(heavy.B[0, 9:], light.B[0, 9:] / 2)
+    np.testing.assert_array_equal(heavy.B[0, 6:9], light.B[0, 6:9])
+    np.testing.assert_array_equal(heavy.c, light.c)

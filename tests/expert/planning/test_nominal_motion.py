@@ -154,6 +154,9 @@ def test_inertia_scales_the_turning_and_mass_does_not_matter_to_the_rest():
     np.testing.assert_allclose(heavy.position[:, 1], light.position[:, 1] / 2, atol=1e-12)
     np.testing.assert_allclose(heavy.position[:, 3:], light.position[:, 3:], atol=1e-12)
     np.testing.assert_allclose(INERTIA, np.diag(RobotModel().standing_inertia()), atol=2e-3)
+    # Twice the mass with twice the inertia moves alike.
+    twice = nominal_motion(bound, tuple(2 * moment for moment in INERTIA), HEIGHT, 2 * robot.MASS)
+    np.testing.assert_allclose(twice.position, light.position, atol=1e-12)
 
 
 @EVERY

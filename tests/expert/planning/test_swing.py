@@ -163,3 +163,17 @@ def test_feet_clear_the_ground_during_the_swing(standing, model):
         for s in np.linspace(0.05, 0.8, 10):
             state, dynamics = moving(standing, model, gait, 0.0, gait.duty + s * (1 - gait.duty) - gait.offsets[0])
             assert arc(state, dynamics)[0][0, 2] > robot.FOOT_RADIUS
+
+
+def test_a_foot_is_lifted_as_much_higher_as_feet_sink_in(standing, model):
+    gait = GAITS["trot"]
+    state = replace(standing, gait=gait, phase=0.5 * (1.0 + gait.duty))
+    rule, dynamics = SwingRule(stiffness=400.0), model.dynamics(standing)
+    on_hard, on_soft = answer(rule, state, dynamics), answer(rule, replace(state, foot_sink=0.01), dynamics)
+    leg = int(np.argmin(gait.stance(state.phase)))
+    s = (gait.leg_phase(state.phase)[leg] - gait.duty) / (1 - gait.duty) / (1 - rule.early)
+    lift, climb, bend = hump(np.array([s]))
+    time = gait.swing_s * (1 - rule.early)
+    expected = 0.01 * (bend / time**2 + rule.damping * climb / time + rule.stiffness * lift)
+    assert on_soft[leg, 2] - on_hard[leg, 2] == pytest.approx(expected[0], rel=1e-6)
+    np.testing.assert_array_equal(on_soft[:, :2], on_hard[:, :2])
