@@ -7,14 +7,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy import stats
 
-from trainers.evaluation.metrics import wilson_interval
-
-Z_95 = float(stats.norm.ppf(0.975))
-"""Of two-sided 95 % intervals."""
+from trainers.evaluation.metrics import exact_interval
 
 
 class Rate(NamedTuple):
-    """Successes of trials, with Wilson's 95 % interval (Wilson, 1927); NaN where there are no trials."""
+    """Successes of trials, with Clopper and Pearson's exact 95 % interval; NaN where there are no trials."""
 
     successes: int
     trials: int
@@ -27,7 +24,7 @@ class Rate(NamedTuple):
     @property
     def interval(self) -> tuple[float, float]:
         """Lower and upper bound."""
-        return wilson_interval(self.successes, self.trials, Z_95) if self.trials else (math.nan, math.nan)
+        return exact_interval(self.successes, self.trials) if self.trials else (math.nan, math.nan)
 
 
 class Estimate(NamedTuple):
@@ -51,8 +48,8 @@ def estimate(values: Sequence[float]) -> Estimate:
 def drops(before: Rate, after: Rate) -> bool:
     """Whether a share falls by more than the 95 % interval of the difference.
 
-    p - q > sqrt((p - l)^2 + (u - q)^2), with p and its lower bound l before, q and its upper bound u after (Newcombe,
-    1998, method 10).
+    p - q > sqrt((p - l)^2 + (u - q)^2), with p and its lower bound l before, q and its upper bound u after: method 10
+    of Newcombe (1998), with exact bounds in place of Wilson's.
     """
     p, q = before.value, after.value
     return p - q > math.hypot(p - before.interval[0], after.interval[1] - q) + 1e-9

@@ -114,7 +114,7 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
         self.action_space = Box(-1.0, 1.0, (12,), dtype=np.float32)
         self.render_mode = config.render_mode
         self._spec: EnvSpec | None = None
-        self._simulation = Simulation(self.gains, config.physics)
+        self._simulation = Simulation(self.gains, config.physics, config.robot)
         self._episode: Episode | None = None
         self._expert: Expert | None = None
         self._renderer: Any = None

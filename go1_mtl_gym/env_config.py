@@ -1,5 +1,6 @@
 """Everything that an environment can be asked for, as one immutable, validated value."""
 
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any
@@ -63,6 +64,7 @@ class EnvConfig:
         sensors: faults of the readings that are observed; the expert's state has none.
         settle_s: time for which the robot stands before the episode begins [s], rounded to milliseconds: under
             action 0, until joints and feet have given way.
+        robot: path of an MJCF file of another Go1, or None for ours; the experts go on thinking of ours.
 
     Raises:
         InvalidInputError: if something is not as described.
@@ -88,6 +90,7 @@ class EnvConfig:
     sensors: SensorParams = field(default_factory=SensorParams)
     settle_s: float = 0.0
     privileged: bool = False
+    robot: str | None = None
 
     def __post_init__(self) -> None:
         """Check everything, and bring it into its one form."""
@@ -113,6 +116,7 @@ class EnvConfig:
             sensors=parameters_of(self.sensors, SensorParams, "sensors"),
             settle_s=number_in(self.settle_s, *SETTLE_S, "settle_s [s]"),
             privileged=yes_or_no(self.privileged, "privileged"),
+            robot=_path(self.robot),
         )
         self._check_together()
 
@@ -234,6 +238,19 @@ def check_control_hz(control_hz: object) -> int:
     if rate % 1 or PHYSICS_HZ % rate:
         raise InvalidInputError(f"control_hz must be an integer that divides {PHYSICS_HZ}, got {control_hz}")
     return int(rate)
+
+
+def _path(value: object) -> str | None:
+    """Return the path of a robot's file; None stays None.
+
+    Raises:
+        InvalidInputError: if there is no such file.
+    """
+    if value is None:
+        return None
+    if not isinstance(value, (str, os.PathLike)) or not os.path.isfile(value):
+        raise InvalidInputError(f"robot must be the path of an MJCF file or None, got {value!r}")
+    return os.fspath(value)
 
 
 def _names(kind: type) -> tuple[str, ...]:

@@ -22,11 +22,16 @@ if TYPE_CHECKING:
     from trainers.data.collection import CollectJob, ShardMismatchError, collect, collect_all, watch
     from trainers.data.demonstrations import Demonstrations
     from trainers.data.environments import PerturbationConfig, make_env, make_venv
+    from trainers.data.operator import OperatorConfig
     from trainers.data.stateful import Learner
+    from trainers.evaluation.certificate import Certificate
+    from trainers.evaluation.certify import certify
     from trainers.evaluation.closed_loop import evaluate
+    from trainers.evaluation.conditions import Condition
     from trainers.evaluation.figures import joint_target_figure
     from trainers.evaluation.gait_transitions import evaluate_transition
     from trainers.evaluation.metrics import offline_metrics
+    from trainers.evaluation.replay import replay
     from trainers.evaluation.scoring import ClosedLoopResult, EpisodeRecord
     from trainers.evaluation.video import record_frames, save_gif, tile
     from trainers.pipeline.config import JobConfig
@@ -46,9 +51,11 @@ _HOME = {
     "BCHistory": "algorithms.bc",
     "BCTrainer": "algorithms.bc",
     "BlockCollector": "algorithms.dagger_collector",
+    "Certificate": "evaluation.certificate",
     "CheckpointError": "policies.checkpoint",
     "ClosedLoopResult": "evaluation.scoring",
     "CollectJob": "data.collection",
+    "Condition": "evaluation.conditions",
     "DAggerConfig": "algorithms.dagger",
     "DAggerTrainer": "algorithms.dagger",
     "Demonstrations": "data.demonstrations",
@@ -59,12 +66,14 @@ _HOME = {
     "Learner": "data.stateful",
     "MultiHeadPolicy": "policies.multi_head",
     "MultiTaskLoss": "algorithms.losses",
+    "OperatorConfig": "data.operator",
     "PerturbationConfig": "data.environments",
     "PhaseConfig": "algorithms.phase_free",
     "PhaseEstimator": "policies.phase_estimator",
     "PhaseFreePolicy": "policies.phase_free",
     "ShardMismatchError": "data.collection",
     "TensorBatches": "data.batches",
+    "certify": "evaluation.certify",
     "closest_task": "algorithms.add_task",
     "collect": "data.collection",
     "collect_all": "data.collection",
@@ -85,6 +94,7 @@ _HOME = {
     "phase_errors": "policies.phase_estimator",
     "ppo_from_policy": "algorithms.ppo",
     "record_frames": "evaluation.video",
+    "replay": "evaluation.replay",
     "results_table": "utils.report",
     "save_gif": "evaluation.video",
     "tile": "evaluation.video",

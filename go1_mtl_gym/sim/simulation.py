@@ -9,6 +9,7 @@ from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PHYSICS_HZ, PDGains
 from go1_mtl_gym.rotations import matrix_from_quat
 from go1_mtl_gym.sensing.sensor_faults import Reading
+from go1_mtl_gym.sim import robot_file
 from go1_mtl_gym.sim.physics_params import CHANGED_ARRAYS, INERTIAL_ARRAYS, ActionDelay, PhysicsParams
 
 CONTACT_FORCE = 2.0
@@ -23,6 +24,7 @@ class Simulation:
     Args:
         gains: of the PD actuators.
         physics_params: what is different about the physics.
+        robot_path: MJCF file of another Go1 (`go1_mtl_gym.sim.robot_file.load`), or None.
 
     Attributes:
         model: the MuJoCo model; private to this simulation, so it may be changed (friction, masses). Copies of an
@@ -31,9 +33,14 @@ class Simulation:
         physics_params: what is different about the physics now.
     """
 
-    def __init__(self, gains: PDGains, physics_params: PhysicsParams | None = None) -> None:
+    def __init__(
+        self, gains: PDGains, physics_params: PhysicsParams | None = None, robot_path: str | None = None
+    ) -> None:
         """Load the model; the robot's state is whatever the file says until `reset`."""
-        self.model = mujoco.MjModel.from_xml_path(robot.SCENE_PATH)
+        if robot_path is None:
+            self.model = mujoco.MjModel.from_xml_path(robot.SCENE_PATH)
+        else:
+            self.model = robot_file.load(robot_path)
         self.data = mujoco.MjData(self.model)
         self._scratch: mujoco.MjData | None = None
         self.model.opt.timestep = 1.0 / PHYSICS_HZ
@@ -50,6 +57,9 @@ class Simulation:
             )
         }
         self._touch = np.array([self._sensor[f"{leg}_touch"].start for leg in robot.LEGS])
+        joints = [self.model.joint(name) for name in robot.JOINTS]
+        self._q_index = np.array([joint.qposadr[0] for joint in joints])
+        self._v_index = np.array([joint.dofadr[0] for joint in joints])
         self._foot_geom = np.array([self.model.geom(f"{leg}_foot").id for leg in robot.LEGS])
 
     def reset(self, q: np.ndarray, yaw: float = 0.0) -> None:
@@ -61,11 +71,11 @@ class Simulation:
         """
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[:7] = [0.0, 0.0, robot.STANDING_HEIGHT, np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)]
-        self.data.qpos[7:] = q
+        self.data.qpos[self._q_index] = q
         self.data.ctrl[:] = q
         self._delay.reset(q)
         mujoco.mj_kinematics(self.model, self.data)
-        self.data.qpos[2] -= self.feet_w[:, 2].min() - robot.FOOT_RADIUS
+        self.data.qpos[2] -= (self.feet_w[:, 2] - self.model.geom_size[self._foot_geom, 0]).min()
         mujoco.mj_forward(self.model, self.data)
 
     def set_physics_params(self, physics_params: PhysicsParams) -> None:
@@ -154,12 +164,12 @@ class Simulation:
     @property
     def q(self) -> np.ndarray:
         """Joint positions [rad], shape (12,)."""
-        return self.data.qpos[7:].copy()
+        return self.data.qpos[self._q_index]
 
     @property
     def v(self) -> np.ndarray:
         """Joint velocities [rad/s], shape (12,)."""
-        return self.data.qvel[6:].copy()
+        return self.data.qvel[self._v_index]
 
     @property
     def torque(self) -> np.ndarray:

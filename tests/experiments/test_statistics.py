@@ -26,13 +26,9 @@ def test_groups_sum_what_is_there():
     assert list(group(RECORDS, ["agent", "task"])) == [("a", "trot"), ("a", "walk"), ("b", "trot"), ("b", "walk")]
 
 
-def test_wilsons_interval_by_hand():
-    # p = 1/2, n = 4: center 1/2, half width z sqrt(1/16 + z^2/64) / (1 + z^2/4)
-    z = 1.959964
-    half = z * math.sqrt(1 / 16 + z * z / 64) / (1 + z * z / 4)
-    assert Rate(2, 4).interval == pytest.approx((0.5 - half, 0.5 + half), abs=1e-6)
-    low, high = Rate(20, 20).interval
-    assert low == pytest.approx(1 / (1 + z * z / 20), abs=1e-6) and high == 1.0
+def test_a_rate_has_the_exact_interval():
+    assert Rate(20, 20).interval == pytest.approx((0.025 ** (1 / 20), 1.0))
+    assert Rate(1, 2).interval == pytest.approx((1 - math.sqrt(0.975), math.sqrt(0.975)))
     assert math.isnan(Rate(0, 0).value) and math.isnan(Rate(0, 0).interval[0])
 
 

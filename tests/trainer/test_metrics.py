@@ -9,7 +9,14 @@ import pytest
 from go1_mtl_gym.errors import InvalidInputError
 from tests.trainer.test_dataset import tiny
 from trainers import offline_metrics
-from trainers.evaluation.metrics import regression_metrics, touchdowns, tracking_error, wilson_interval
+from trainers.evaluation.metrics import (
+    exact_interval,
+    lower_bound,
+    mcnemar,
+    regression_metrics,
+    touchdowns,
+    tracking_error,
+)
 from trainers.utils.files import json_ready
 
 
@@ -74,13 +81,26 @@ def test_touchdowns_ignore_bounces_and_the_start():
     assert touchdowns(contacts, min_air=2, skip=4).tolist() == [1, 0, 0, 1]
 
 
-def test_wilson_interval():
-    low, high = wilson_interval(20, 20)
-    assert high == 1.0 and low == pytest.approx(20 / (20 + 1.96**2))
-    low, high = wilson_interval(10, 20)
-    assert (low + high) / 2 == pytest.approx(0.5) and high - low == pytest.approx(2 * 0.2007, abs=1e-3)
+def test_the_exact_interval_by_hand():
+    # all of n: P(n of n) = p^n is 2.5 % at the lower bound; none: the mirror image
+    assert exact_interval(20, 20) == pytest.approx((0.025 ** (1 / 20), 1.0))
+    assert exact_interval(0, 20) == pytest.approx((0.0, 1 - 0.025 ** (1 / 20)))
+    # one of two: P(1 or 2) = 1 - (1 - p)^2 is 2.5 % at the lower bound
+    assert exact_interval(1, 2) == pytest.approx((1 - math.sqrt(0.975), math.sqrt(0.975)))
+    assert lower_bound(1, 2) == pytest.approx(1 - math.sqrt(0.95)) and lower_bound(0, 3) == 0.0
     with pytest.raises(InvalidInputError):
-        wilson_interval(3, 2)
+        exact_interval(3, 2)
+
+
+@pytest.mark.parametrize(("trials", "failures"), [(299, 0), (473, 1)])
+def test_ninety_nine_percent_take_that_many_episodes(trials, failures):
+    assert lower_bound(trials - failures, trials) >= 0.99 > lower_bound(trials - failures - 1, trials - 1)
+
+
+def test_mcnemars_test_by_hand():
+    assert mcnemar(0, 0) == mcnemar(3, 3) == 1.0
+    assert mcnemar(0, 5) == mcnemar(5, 0) == pytest.approx(2 / 32)  # five coins on one side
+    assert mcnemar(1, 4) == pytest.approx(12 / 32)
 
 
 def test_json_ready():

@@ -3,16 +3,14 @@
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
 from go1_mtl_gym import TASKS
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import integer_in, one_of
-from trainers.data.environments import EnvFactory, base_env, derive_seed, make_env
+from trainers.data.environments import EnvFactory, derive_seed, make_env
 from trainers.data.operator import OperatorConfig
-from trainers.data.operator_wrapper import OperatorWrapper
-from trainers.evaluation.rollout import Rollout, checked_agent, opened, run_all
-from trainers.evaluation.scoring import ClosedLoopResult, EpisodeRecord, score
+from trainers.evaluation.episodes import EpisodeSetup
+from trainers.evaluation.rollout import checked_agent, run_all
+from trainers.evaluation.scoring import ClosedLoopResult, EpisodeRecord
 from trainers.utils.validation import checked_jobs, positive, refuse_overridden
 
 
@@ -78,47 +76,19 @@ def evaluate(
         commands = [TASKS[task].check_command(command).tolist() for command in commands]
     refuse_overridden(env_kwargs, episode_s="seconds", task="task")
     policy_or_expert = checked_agent(policy_or_expert)
-    kwargs = {**getattr(policy_or_expert, "env_kwargs", {}), **env_kwargs, "episode_s": seconds}
+    kwargs = {**getattr(policy_or_expert, "env_kwargs", {}), **env_kwargs}
 
     def call(i: int) -> tuple[Any, ...]:
         command = None if commands is None else tuple(commands[i % len(commands)])
         episode_seed = derive_seed("evaluate", task, seed, i)
-        return policy_or_expert, task, episode_seed, command, command_interval, corners, operator, kwargs, make_env
+        setup = EpisodeSetup(task, episode_seed, seconds, command, command_interval, corners, operator)
+        return setup, policy_or_expert, kwargs, make_env
 
     records = run_all(_episode, map(call, range(episodes)), episodes, n_jobs, progress, f"evaluate {task}")
     return ClosedLoopResult(task, float(seconds), tuple(records))
 
 
 def _episode(
-    policy_or_expert: Any,
-    task: str,
-    seed: int,
-    command: tuple[float, ...] | None,
-    command_interval: float | None,
-    corners: bool,
-    operator: OperatorConfig | None,
-    env_kwargs: dict[str, Any],
-    make_env: EnvFactory,
+    setup: EpisodeSetup, policy_or_expert: Any, env_kwargs: dict[str, Any], make_env: EnvFactory
 ) -> EpisodeRecord:
-    rng = np.random.default_rng(derive_seed("commands", seed))
-    draw = TASKS[task].draw_corner if corners else TASKS[task].draw_command
-    options: dict[str, Any] = {"task": task}
-    if command is not None or corners:
-        options["command"] = tuple(draw(rng).tolist()) if command is None else command
-    with opened(make_env, task, env_kwargs) as env:
-        base = base_env(env)
-        if operator is not None:
-            env = OperatorWrapper(env, operator)
-        rollout = Rollout(env, policy_or_expert, seed, options)
-        given = [rollout.command]
-        steps = round(env_kwargs["episode_s"] * base.control_hz)
-        every = max(1, round(command_interval * base.control_hz)) if command_interval else steps
-
-        def redraw(i: int) -> None:
-            if i and i % every == 0:
-                given.append(tuple(draw(rng).tolist()))
-                base.set_command(given[-1])
-
-        series = rollout.walk(steps, redraw)
-        gait = TASKS[task].gait if operator is None else None
-        return score(series, rollout.fallen, seed, tuple(given), base.control_hz, gait)
+    return setup.play(policy_or_expert, env_kwargs, make_env)[0]

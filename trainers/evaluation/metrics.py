@@ -1,9 +1,10 @@
-"""Figures of merit as pure functions of arrays: one-step errors, velocity tracking, touchdowns, success intervals."""
+"""Figures of merit as pure functions: one-step errors, velocity tracking, touchdowns, success intervals and tests."""
 
 import math
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy import stats
 
 from go1_mtl_gym.errors import InvalidInputError
 from trainers.data.demonstrations import Demonstrations
@@ -119,15 +120,46 @@ def touchdowns(contacts: np.ndarray, min_air: int | np.ndarray, skip: int) -> np
     return count
 
 
-def wilson_interval(successes: int, trials: int, z: float = 1.96) -> tuple[float, float]:
-    """Wilson's score interval of a success rate (z = 1.96: 95 %), which stays sensible at 0 and 1 (Wilson, 1927).
+def exact_interval(successes: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
+    """Clopper and Pearson's (1934) exact interval of a success rate: it holds the rate at least as often as it says.
 
-    centre = (p + z^2/2n) / (1 + z^2/n), half width = z sqrt(p(1-p)/n + z^2/4n^2) / (1 + z^2/n).
+    Of x successes among n, the lower bound is the (1 - c) / 2 quantile of Beta(x, n - x + 1) and the upper one the
+    (1 + c) / 2 quantile of Beta(x + 1, n - x); 0 and 1 where there are none, or no failures.
+
+    Args:
+        successes: x.
+        trials: n, decided beforehand.
+        confidence: c, of both sides together.
+
+    Raises:
+        InvalidInputError: if the counts do not fit together.
     """
     if not 0 <= successes <= trials or trials < 1:
         raise InvalidInputError(f"expected 0 <= successes <= trials >= 1, got {successes} of {trials}")
-    p = successes / trials
-    shrink = 1 + z * z / trials
-    centre = (p + z * z / (2 * trials)) / shrink
-    half = z * math.sqrt(p * (1 - p) / trials + z * z / (4 * trials * trials)) / shrink
-    return max(0.0, centre - half), min(1.0, centre + half)
+    interval = stats.binomtest(int(successes), int(trials)).proportion_ci(confidence, "exact")
+    return float(interval.low), float(interval.high)
+
+
+def lower_bound(successes: int, trials: int, confidence: float = 0.95) -> float:
+    """The exact lower bound of a success rate that holds by itself: the 1 - c quantile of Beta(x, n - x + 1).
+
+    Args:
+        successes: x, of n trials.
+        trials: n, decided beforehand.
+        confidence: c, of this one side.
+    """
+    test = stats.binomtest(int(successes), int(trials), alternative="greater")
+    return float(test.proportion_ci(confidence, "exact").low)
+
+
+def mcnemar(only_first: int, only_second: int) -> float:
+    """Exact two-sided p-value of McNemar's test (1947) that two agents succeed equally often on the same episodes.
+
+    Only the episodes in which they differ tell them apart: each of these is a fair coin if the agents are equal.
+
+    Args:
+        only_first: episodes in which only the first agent succeeded.
+        only_second: only the second.
+    """
+    differing = only_first + only_second
+    return float(stats.binomtest(only_first, differing).pvalue) if differing else 1.0

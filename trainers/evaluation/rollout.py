@@ -150,7 +150,7 @@ class Rollout:
         Raises:
             InvalidInputError: if the environment ends the episode before these steps are done.
         """
-        measured, wanted, contacts, running, gaits, moves = [], [], [], [], [], []
+        running, told = [], []
         for i in range(0 if self.fallen else steps):
             if self._over:
                 raise InvalidInputError(f"the environment ended an episode {steps - i} steps too early")
@@ -158,21 +158,20 @@ class Rollout:
                 before_step(i)
             running.append(not self._info.get("standing", False))
             self._obs, _, terminated, truncated, self._info = self._env.step(self._act(self._obs))
-            measured.append(self._info["base_velocity"])
-            wanted.append(self._info["filtered_command"])
-            contacts.append(self._info["contacts"])
-            gaits.append(TASKS[self._info["task"]].gait)
-            moves.append(self._info.get("operator_move", ""))
+            told.append(self._info)
             self.fallen, self._over = bool(terminated), bool(terminated or truncated)
             if self.fallen:
                 break
         return Series(
-            measured=np.array(measured, dtype=float).reshape(-1, 3),
-            wanted=np.array(wanted, dtype=float).reshape(-1, 3),
-            contacts=np.array(contacts, dtype=bool).reshape(-1, 4),
+            measured=np.array([info["base_velocity"] for info in told], dtype=float).reshape(-1, 3),
+            wanted=np.array([info["filtered_command"] for info in told], dtype=float).reshape(-1, 3),
+            contacts=np.array([info["contacts"] for info in told], dtype=bool).reshape(-1, 4),
             running=np.array(running, dtype=bool),
-            gaits=tuple(gaits),
-            moves=tuple(moves) if any(moves) else (),
+            gaits=tuple(TASKS[info["task"]].gait for info in told),
+            commands=np.array([info["command"] for info in told], dtype=float).reshape(-1, 3),
+            tasks=tuple(info["task"] for info in told),
+            moves=tuple(info["operator_move"] for info in told if "operator_move" in info),
+            events=tuple(info["operator_events"] for info in told if "operator_events" in info),
         )
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from go1_mtl_gym import Gait
-from trainers.evaluation.metrics import touchdowns, tracking_error, wilson_interval
+from trainers.evaluation.metrics import exact_interval, touchdowns, tracking_error
 from trainers.utils.files import json_ready
 
 SETTLE_S = 2.0
@@ -33,7 +33,10 @@ class Series:
         contacts: feet on the ground, bool, shape (n, 4).
         running: whether the gait clock ran during the step, bool, shape (n,).
         gaits: that the clock was of, after each step.
+        commands: as asked for, shape (n, 3).
+        tasks: names of the tasks, after each step.
         moves: what the hands were doing, if there are any; empty otherwise.
+        events: what they did in each step besides: "push", or the name of a task; empty without hands.
     """
 
     measured: np.ndarray
@@ -41,7 +44,10 @@ class Series:
     contacts: np.ndarray
     running: np.ndarray
     gaits: tuple[Gait, ...]
+    commands: np.ndarray
+    tasks: tuple[str, ...]
     moves: tuple[str, ...] = ()
+    events: tuple[tuple[str, ...], ...] = ()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -121,8 +127,8 @@ class ClosedLoopResult:
 
     @property
     def success_interval(self) -> tuple[float, float]:
-        """95 % Wilson interval of the success rate."""
-        return wilson_interval(sum(e.success for e in self.episodes), len(self.episodes))
+        """95 % interval (Clopper and Pearson's) of the success rate."""
+        return exact_interval(sum(e.success for e in self.episodes), len(self.episodes))
 
     def __str__(self) -> str:
         """One line for people; `repr` has every episode."""

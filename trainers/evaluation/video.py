@@ -8,12 +8,12 @@ from typing import Any, cast
 import gymnasium
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
-from threadpoolctl import threadpool_limits
 
 from go1_mtl_gym import Go1Env
 from go1_mtl_gym.errors import InvalidInputError
 from trainers.data.environments import base_env, make_env
-from trainers.evaluation.rollout import begin, checked_agent, controller
+from trainers.evaluation.episodes import EpisodeSetup
+from trainers.evaluation.rollout import checked_agent
 from trainers.utils.files import write_atomically
 from trainers.utils.validation import refuse_overridden
 
@@ -61,40 +61,60 @@ def record_frames(
         InvalidInputError: if an argument is not as described.
         go1_mtl_gym.rendering.RenderingError: if no picture can be drawn on this machine.
     """
-    if not (seconds > 0 and 0 < fps <= MAX_FPS):
-        raise InvalidInputError(f"seconds must be > 0 and fps from 1 to {MAX_FPS}, got {seconds} and {fps}")
-    if min(width, height) < 16 or max(width, height) > 2048:
-        raise InvalidInputError(f"width and height must be from 16 to 2048 pixels, got {width} and {height}")
+    if not seconds > 0:
+        raise InvalidInputError(f"seconds must be > 0, got {seconds}")
     policy_or_expert = checked_agent(policy_or_expert)
     refuse_overridden(env_kwargs, episode_s="seconds", render_mode="record_frames", task="task")
-    kwargs = {**getattr(policy_or_expert, "env_kwargs", {}), **env_kwargs, "episode_s": seconds + 1.0}
-    kwargs |= {"render_mode": "rgb_array", "width": 2 * width, "height": 2 * height}
-    env = make_env(task, None, **kwargs)
-    try:
+    film = Film(width, height, fps)
+    kwargs = {**getattr(policy_or_expert, "env_kwargs", {}), **env_kwargs, **film.env_kwargs}
+    EpisodeSetup(task, seed, seconds, command=command).play(policy_or_expert, kwargs, make_env, film)
+    return film.frames(max(1, round(seconds * fps)))
+
+
+class Film:
+    """Takes pictures of an episode while it is played: the `watch` of `EpisodeSetup.play`.
+
+    Args:
+        width: of a picture [pixels].
+        height: likewise.
+        fps: pictures per second, at most the control rate.
+        start_s: when the first one is taken [s].
+
+    Raises:
+        InvalidInputError: if a size or rate cannot be.
+    """
+
+    def __init__(self, width: int, height: int, fps: int, start_s: float = 0.0) -> None:
+        if not 0 < fps <= MAX_FPS:
+            raise InvalidInputError(f"fps must be from 1 to {MAX_FPS}, got {fps}")
+        if min(width, height) < 16 or max(width, height) > 2048:
+            raise InvalidInputError(f"width and height must be from 16 to 2048 pixels, got {width} and {height}")
+        self._size, self._fps, self._start_s = (2 * width, 2 * height), fps, start_s
+        self._pictures: list[np.ndarray] = []
+
+    @property
+    def env_kwargs(self) -> dict[str, Any]:
+        """What the environment needs to be filmed."""
+        width, height = self._size
+        return {"render_mode": "rgb_array", "width": width, "height": height}
+
+    def __call__(self, env: gymnasium.Env, step: int) -> None:
+        """Take a picture if it is due."""
+        due = round((self._start_s + len(self._pictures) / self._fps) * base_env(env).control_hz)
+        if step >= due:
+            if not self._pictures:
+                self._set_up(env)
+            self._pictures.append(_picture(env))
+
+    def _set_up(self, env: gymnasium.Env) -> None:
         visual = cast(Go1Env, env.unwrapped).simulation.model.vis
         visual.quality.offsamples, visual.quality.shadowsize = 0, SHADOW_PIXELS
-        visual.global_.offwidth, visual.global_.offheight = 2 * width, 2 * height
-        options = {"task": task, "command": command}
-        with threadpool_limits(1):
-            return _film(env, policy_or_expert, options, seed, max(1, round(seconds * fps)), fps)
-    finally:
-        env.close()
+        visual.global_.offwidth, visual.global_.offheight = self._size
 
-
-def _film(
-    env: gymnasium.Env, policy_or_expert: Any, options: dict[str, Any], seed: int, count: int, fps: int
-) -> np.ndarray:
-    base = base_env(env)
-    act = controller(policy_or_expert, base)
-    obs, _ = begin(env, policy_or_expert, seed, options)
-    frames = [_picture(env)]
-    step, terminated = 0, False
-    while len(frames) < count:
-        while step < round(len(frames) * base.control_hz / fps) and not terminated:
-            obs, _, terminated, _, _ = env.step(act(obs))
-            step += 1
-        frames.append(frames[-1] if terminated else _picture(env))
-    return np.stack(frames)
+    def frames(self, count: int) -> np.ndarray:
+        """The first `count` pictures, uint8, shape (count, height, width, 3); the last one stays if there are fewer."""
+        pictures = self._pictures[:count]
+        return np.stack([*pictures, *pictures[-1:] * (count - len(pictures))])
 
 
 def _picture(env: gymnasium.Env) -> np.ndarray:
