@@ -120,7 +120,7 @@ class Episode:
         leaves = mark is None or before == self.phase or passes(mark, before, self.phase)
         if self.next_task is not None and leaves and self.is_slow_enough_for(self.next_task):
             self._begin(self.next_task)
-        self.filtered_command = filtered(self.command, self.filtered_command, seconds)
+        self.filtered_command = filtered(self._followed_command(), self.filtered_command, seconds)
 
     def ahead(self, physics_steps: int, period: int) -> "Episode":
         """The episode some time later, if nobody asks for anything else; this one stays as it is.

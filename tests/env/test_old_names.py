@@ -7,6 +7,7 @@ import pytest
 import go1_mtl_gym
 from go1_mtl_gym import DomainRandomization, Go1Env, PerturbationWrapper
 from go1_mtl_gym._moved import MOVED
+from go1_mtl_gym.env_config import EXPERT_ONLY
 
 OLD = [
     ("realism", "Realism", go1_mtl_gym.PhysicsParams),
@@ -15,7 +16,7 @@ OLD = [
     ("estimator", "EstimatorNoise", go1_mtl_gym.EstimatorNoise),
     ("perturbation", "PerturbationWrapper", PerturbationWrapper),
     ("randomization", "DomainRandomization", DomainRandomization),
-    ("conditions", "EXPERTS_ALONE", ("estimator_noise", "state_estimator")),
+    ("conditions", "EXPERTS_ALONE", EXPERT_ONLY),
 ]
 
 
