@@ -27,10 +27,10 @@ COMMAND_FILTER_S = 0.2
 """Time constant of the low-pass between a command and what expert and student see of it [s]."""
 COMMAND_SLEW = (3.0, 3.0, 6.0)
 """Largest change of the filtered command per second: vx, vy [m/s^2], yaw rate [rad/s^2]."""
-REACH = 1.15
-"""A gait may be begun with a filtered command that is larger than its largest by this factor."""
-SLACK_COMMAND = 0.02
-"""And by this much [m/s, rad/s], where the largest is about zero."""
+CHANGE_FRACTION = 0.5
+"""A gait is changed while the filtered command is within this share of both gaits' `command_range`."""
+REACH, SLACK_COMMAND = 1.15, 0.02
+"""About within it: larger by this factor, and by this much [m/s, rad/s]."""
 RESET_JOINT_NOISE = 0.03
 """Largest deviation of a joint from the home pose after a reset [rad]."""
 FALLEN_HEIGHT = 0.14
@@ -160,20 +160,23 @@ class Episode:
         self.command = command
 
     def _followed_command(self) -> np.ndarray:
-        """What the filter follows: the command; while a task waits to be begun, as far as the present one goes."""
+        """What the filter follows: the command; while a task waits to be begun, only as far as a change allows."""
         if self.next_task is None:
             return self.command
-        reach = np.array(self.task.command_range)
+        reach = self._change_reach(self.next_task)
         return np.clip(self.command, -reach, reach)
 
-    def is_slow_enough_for(self, task: Task) -> bool:
-        """Whether the filtered command is one that a task can be begun with.
+    def _change_reach(self, task: Task) -> np.ndarray:
+        """The largest |vx|, |vy| [m/s] and |yaw rate| [rad/s] with which to change to a task, shape (3,)."""
+        return CHANGE_FRACTION * np.minimum(self.task.command_range, task.command_range)
 
-        That is one within the task's `command_range`, or what is asked of it, and a seventh more: the filter comes near
-        a command soon, and never to it.
+    def is_slow_enough_for(self, task: Task) -> bool:
+        """Whether a task may be begun: the filtered command is about within what a change allows.
+
+        The filter comes near a command soon, and never to it.
         """
-        reach = np.maximum(task.command_range, np.abs(self.command))
-        return bool((np.abs(self.filtered_command) <= REACH * reach + SLACK_COMMAND).all())
+        reach = REACH * self._change_reach(task) + SLACK_COMMAND
+        return bool((np.abs(self.filtered_command) <= reach).all())
 
     def change_task(self, task: Task, phase: float | None) -> None:
         """Change the task: at once to a phase, or with None to phase 0 as soon as the present gait can be left.
