@@ -287,8 +287,8 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
             task: name of the new one.
             phase: of its gait [cycles], in [0, 1), at once; None lets it begin at phase 0, at once but for two cases:
                 gaits that leave the ground with all feet go on until the middle of their stance
-                (`Gait.change_phase`), and a robot whose filtered command is beyond the new task's `command_range` goes
-                on in the present gait until it has slowed down.
+                (`Gait.change_phase`), and a robot that is faster than half of either task's `command_range` slows
+                down first.
 
         Raises:
             InvalidInputError: if the task is unknown here, does not allow the present command, or the phase is none.

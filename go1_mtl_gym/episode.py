@@ -11,7 +11,7 @@ import numpy as np
 from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PHYSICS_HZ
 from go1_mtl_gym.env_config import EnvConfig
-from go1_mtl_gym.gaits import fitting_phase, is_standing, next_phase, passes
+from go1_mtl_gym.gaits import next_phase, passes
 from go1_mtl_gym.rewards import reward_terms
 from go1_mtl_gym.sensing.observation import SensorNoise
 from go1_mtl_gym.sensing.sensor_faults import SensorFaults
@@ -119,7 +119,7 @@ class Episode:
         self.phase = next_phase(self.task.gait, before, self.filtered_command, seconds)
         leaves = mark is None or before == self.phase or passes(mark, before, self.phase)
         if self.next_task is not None and leaves and self.is_slow_enough_for(self.next_task):
-            self._begin(self.next_task)
+            self.change_task(self.next_task, 0.0)
         self.filtered_command = filtered(self._followed_command(), self.filtered_command, seconds)
 
     def ahead(self, physics_steps: int, period: int) -> "Episode":
@@ -181,21 +181,14 @@ class Episode:
     def change_task(self, task: Task, phase: float | None) -> None:
         """Change the task: at once to a phase, or with None to phase 0 as soon as the present gait can be left.
 
-        With None, a task that is present already goes on as it is, and a robot that is too fast for the new task brakes
-        in the present one.
+        With None, a task that is present already goes on as it is, and a robot that is too fast for a change slows down
+        in the present one first.
         """
-        if phase is not None:
-            self.task, self.phase, self.next_task = task, phase, None
-        elif task != self.task and self.task.gait.change_phase is None and self.is_slow_enough_for(task):
-            self._begin(task)
+        at_once = task != self.task and self.task.gait.change_phase is None and self.is_slow_enough_for(task)
+        if phase is not None or at_once:
+            self.task, self.phase, self.next_task = task, phase or 0.0, None
         else:
             self.next_task = None if task == self.task else task
-
-    def _begin(self, task: Task) -> None:
-        """Change the task now, at the phase that fits; out of a stand at phase 0."""
-        standing = is_standing(self.task.gait, self.phase, self.filtered_command)
-        phase = 0.0 if standing else fitting_phase(self.task.gait, self.phase, task.gait)
-        self.task, self.phase, self.next_task = task, phase, None
 
     # -- Its reports ---------------------------------------------------------------------------------------------------
 

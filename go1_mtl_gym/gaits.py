@@ -18,10 +18,6 @@ _ALLOWED = {
     "swing_height": Limits(0.01, 0.2, " [m]"),
     "stance_width": Limits(0.3, 1.5),
 }
-FIT_S = 0.2
-"""How far ahead two contact plans are compared [s]."""
-FIT_SAMPLES, FIT_PHASES = 20, 40
-"""At how many instants, and for how many phases."""
 _SLACK = 1e-9  # of the clock [cycles]; adding up fractions of a cycle ends a little below the whole
 
 
@@ -172,28 +168,6 @@ def next_phase(gait: Gait, phase: float, command: np.ndarray, seconds: float) ->
     if asks_to_stand(gait, command) and (phase == 0.0 or turns >= 1.0 - _SLACK):
         return 0.0
     return turns % 1.0
-
-
-def fitting_phase(before: Gait, phase: float, after: Gait) -> float:
-    """Where a gait is best begun out of another one: at the phase whose contacts agree longest with those under way.
-
-    Of `FIT_PHASES` phases it is the one with the least sum, over legs and the coming `FIT_S`, of the time for which one
-    plan has a foot on the ground and the other in the air; the coming instants weigh more. Among equals it is the one
-    nearest to 0.
-
-    Args:
-        before: the gait under way.
-        phase: of its clock [cycles].
-        after: the gait to begin.
-    """
-    times = np.linspace(0.0, FIT_S, FIT_SAMPLES)
-    weight = np.exp(-3.0 * times / FIT_S)
-    under_way = before.stance(phase + times / before.period)
-    phases = np.arange(FIT_PHASES) / FIT_PHASES
-    planned = after.stance(phases[:, None] + times / after.period)
-    disagreement = ((planned != under_way) * weight[:, None]).sum(axis=(1, 2))
-    from_zero = np.minimum(phases, 1.0 - phases)
-    return float(phases[np.lexsort((from_zero, np.round(disagreement, 9)))[0]])
 
 
 def passes(mark: float, before: float, after: float) -> bool:

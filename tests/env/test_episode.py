@@ -185,31 +185,54 @@ def running(task, command, filtered_command=None):
     return episode
 
 
-def test_a_robot_that_is_too_fast_for_a_gait_slows_down_before_it_changes():
-    limit = np.array(TASKS["walk"].command_range)
+def half_reach(first, second):
+    return 0.5 * np.minimum(TASKS[first].command_range, TASKS[second].command_range)
+
+
+def until_it_changes(episode):
+    """The filtered commands from now until the task that waits is begun."""
+    seen, before = [], episode.task
+    while episode.task == before:
+        seen.append(episode.filtered_command)
+        episode.advance(np.zeros(12), 0.02)
+        assert len(seen) < 100
+    return np.array([*seen, episode.filtered_command])
+
+
+def test_a_robot_that_is_too_fast_slows_down_to_half_before_it_changes_its_gait():
     episode = running("trot", (1.6, 0.0, 0.0))
-    episode.change_command(np.array([limit[0], 0.0, 0.0]))
+    episode.change_command(np.array([0.7, 0.0, 0.0]))
     episode.change_task(TASKS["walk"], None)
     assert episode.task.name == "trot" and episode.requested_task.name == "walk"
-    while episode.task.name == "trot":
-        before = episode.filtered_command[0]
-        assert episode.steps < 100
+    forward = until_it_changes(episode)[:, 0]
+    reach = half_reach("trot", "walk")[0]
+    assert forward[0] == 1.6 and forward[-2] <= REACH * reach + SLACK_COMMAND and (np.diff(forward[:-1]) < 0).all()
+    assert episode.task.name == "walk" and episode.phase == 0.0
+    for _ in range(100):
         episode.advance(np.zeros(12), 0.02)
-    assert before > 1.1 * limit[0] and episode.filtered_command[0] <= REACH * limit[0] + SLACK_COMMAND
-    assert episode.phase == 0.0
+    assert episode.filtered_command[0] == pytest.approx(0.7, abs=1e-3)  # and goes on as it was told
+
+
+def test_every_component_counts():
+    for axis in range(3):
+        command = 1.3 * half_reach("trot", "pace") * (np.arange(3) == axis)
+        episode = running("trot", command)
+        episode.change_task(TASKS["pace"], None)
+        assert episode.task.name == "trot"
 
 
 def test_a_robot_that_is_slow_enough_changes_at_once():
-    episode = running("trot", (0.5, 0.1, 0.0))
+    episode = running("trot", half_reach("trot", "walk"))
     episode.change_task(TASKS["walk"], None)
-    assert episode.task.name == "walk" and episode.next_task is None
+    assert episode.task.name == "walk" and episode.phase == 0.0 and episode.next_task is None
 
 
-def test_what_is_asked_of_a_gait_may_be_more_than_its_range():
+def test_a_command_beyond_the_new_gaits_range_does_not_keep_it_waiting():
     beyond = TASKS["walk"].command_limit[0]
     episode = running("trot", (beyond, 0.0, 0.0))
     episode.change_task(TASKS["walk"], None)
-    assert episode.task.name == "walk"
+    until_it_changes(episode)
+    assert episode.task.name == "walk" and episode.command[0] == beyond
 
 
 def test_a_phase_begins_a_gait_at_any_speed():
@@ -218,14 +241,10 @@ def test_a_phase_begins_a_gait_at_any_speed():
     assert episode.task.name == "walk" and episode.phase == 0.25
 
 
-def test_while_a_gait_waits_the_present_one_is_not_sent_beyond_its_range():
+def test_while_a_gait_waits_the_present_one_does_not_speed_up():
     episode = running("jump", (0.0, 0.0, 0.0))
     episode.phase = 0.5
     episode.change_task(TASKS["bound"], None)
     episode.change_command(np.array([TASKS["bound"].command_range[0], 0.0, 0.0]))
-    reached = []
-    while episode.task.name == "jump":
-        episode.advance(np.zeros(12), 0.02)
-        reached.append(episode.filtered_command[0])
-        assert len(reached) < 100
-    assert max(reached) <= TASKS["jump"].command_range[0]
+    reached = until_it_changes(episode)[:, 0]
+    assert len(reached) > 3 and reached[:-1].max() <= half_reach("jump", "bound")[0]
