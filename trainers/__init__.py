@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from trainers.data.collection import CollectJob, ShardMismatchError, collect, collect_all, watch
     from trainers.data.demonstrations import Demonstrations
     from trainers.data.environments import PerturbationConfig, make_env, make_venv
+    from trainers.data.mirror import mirrored
+    from trainers.data.operator import OperatorConfig, draw_plan
+    from trainers.data.operator_wrapper import OperatorWrapper
     from trainers.data.stateful import Learner
     from trainers.evaluation.closed_loop import evaluate
     from trainers.evaluation.figures import joint_target_figure
@@ -59,6 +62,8 @@ _HOME = {
     "Learner": "data.stateful",
     "MultiHeadPolicy": "policies.multi_head",
     "MultiTaskLoss": "algorithms.losses",
+    "OperatorConfig": "data.operator",
+    "OperatorWrapper": "data.operator_wrapper",
     "PerturbationConfig": "data.environments",
     "PhaseConfig": "algorithms.phase_free",
     "PhaseEstimator": "policies.phase_estimator",
@@ -68,6 +73,7 @@ _HOME = {
     "closest_task": "algorithms.add_task",
     "collect": "data.collection",
     "collect_all": "data.collection",
+    "draw_plan": "data.operator",
     "evaluate": "evaluation.closed_loop",
     "evaluate_transition": "evaluation.gait_transitions",
     "joint_target_figure": "evaluation.figures",
@@ -80,6 +86,7 @@ _HOME = {
     "make_env": "data.environments",
     "make_logger": "utils.logging",
     "make_venv": "data.environments",
+    "mirrored": "data.mirror",
     "offline_metrics": "evaluation.metrics",
     "paper_table": "utils.report",
     "phase_errors": "policies.phase_estimator",

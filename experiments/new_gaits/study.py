@@ -28,7 +28,6 @@ from experiments.training_runs import QUICK_JOB, TrainedPolicy, TrainingRun, col
 from go1_mtl_gym import TASKS
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import one_of
-from trainers.pipeline.config import JobConfig
 
 NEW, OLD, BEFORE = "new gait", "old gait", "policy, before"
 COLORS = dict(zip(METHODS, (plots.BLUE, plots.PURPLE, plots.GREEN, plots.RED), strict=True))

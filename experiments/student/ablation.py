@@ -20,8 +20,8 @@ from trainers.pipeline.config import JobConfig
 from trainers.pipeline.presets import PRESETS
 
 CHANGED, HANDS, HELD_OUT = "changed world", "in hands", "held out"
-"""Drawn commands in another world than the model's, an operator's hands, and one-step errors on rows of the policy's own
-demonstrations."""
+"""Drawn commands in another world than the model's, an operator's hands, and one-step errors on rows of the policy's
+own demonstrations."""
 CHANGED_WORLD = {"friction": 0.7, "payload_kg": 1.5, "action_delay_s": 0.01, "joint_friction": 0.5}
 """Arguments of `Go1Env`: the middles of the ranges of the study on robustness, together."""
 DEFAULT = "default, reduced"
@@ -187,7 +187,7 @@ class Ablation(Study):
 
 
 def aggregate_variant(records: Group) -> dict[str, Any]:
-    """Of all gaits together: rates of "success", "transitions", "changed" and "hands"; means of "error" [m/s] and "r2"."""
+    """Of all gaits: rates of "success", "transitions", "changed" and "hands"; means of "error" [m/s] and "r2"."""
     return {
         "success": records.where(condition=DRAWN).rate(),
         "error": records.where(condition=DRAWN).mean("velocity_error"),

@@ -122,9 +122,7 @@ class PhaseFree(Study):
     )
     caption = "Success and error of the phase, of students without a clock"
     full = PhaseFreeOptions()
-    quick = PhaseFreeOptions(
-        replace(full.job, **QUICK_JOB), 2.0, TransitionOptions(1, 0.5, 2.5), 2.5, 1, (0.2,)
-    )
+    quick = PhaseFreeOptions(replace(full.job, **QUICK_JOB), 2.0, TransitionOptions(1, 0.5, 2.5), 2.5, 1, (0.2,))
     code = (*Study.code, "experiments.student.phase", "experiments.training_runs")
     takes_policies = True
 
