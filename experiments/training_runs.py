@@ -30,6 +30,8 @@ QUICK_JOB = {
     "shard_s": 2.0,
     "clean_s": 2.0,
     "perturbed_s": 2.0,
+    "hard_push_s": 0.0,
+    "randomized_s": 0.0,
     "held_out_s": 2.0,
     "clone_steps": 60,
     "episodes": 1,

@@ -49,21 +49,25 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
 
     ## Observation space
 
-    A flat float32 ``Box``, by default of 55 numbers; `layout` names the slices, whatever the arguments.
+    A flat float32 ``Box``, by default of 81 numbers; `layout` names the slices, whatever the arguments.
 
-    | num     | part          | unit            | bounds +-    | there                                          |
-    |---------|---------------|-----------------|--------------|------------------------------------------------|
-    | 0 - 2   | accelerometer | m/s^2           | 160          | always; specific force, trunk frame            |
-    | 3 - 5   | gyroscope     | rad/s           | 35           | always; trunk frame                            |
-    | 6 - 17  | q             | rad             | 2 pi         | always                                         |
-    | 18 - 29 | dq            | rad/s           | 90.3, 60.2   | always                                         |
-    | 30 - 33 | contacts      | 0 or 1          | 0 ... 1      | always; FL FR RL RR                            |
-    | 34 - 36 | command       | m/s, m/s, rad/s | 5            | channel, by default; filtered                  |
-    |         | gravity       | -               | 1            | channel; unit vector, trunk frame              |
-    | 37 - 38 | phase         | -               | 1            | channel, by default; sine and cosine           |
-    | 39 - 50 | last_action   | -               | 1            | channel, by default                            |
-    |         | history       | as above        | as above     | if `history` > 1: 34 numbers per older frame   |
-    | 51 - 54 | task          | 0 or 1          | 0 ... 1      | always; one-hot, K = len(tasks)                |
+    | num     | part           | unit            | bounds +-    | there                                          |
+    |---------|----------------|-----------------|--------------|------------------------------------------------|
+    | 0 - 2   | accelerometer  | m/s^2           | 160          | always; specific force, trunk frame            |
+    | 3 - 5   | gyroscope      | rad/s           | 35           | always; trunk frame                            |
+    | 6 - 17  | q              | rad             | 2 pi         | always                                         |
+    | 18 - 29 | dq             | rad/s           | 90.3, 60.2   | always                                         |
+    | 30 - 33 | contacts       | 0 or 1          | 0 ... 1      | always; FL FR RL RR                            |
+    | 34 - 36 | command        | m/s, m/s, rad/s | 5            | channel, by default; filtered                  |
+    |         | gravity        | -               | 1            | channel; unit vector, trunk frame              |
+    | 37 - 38 | phase          | -               | 1            | channel, by default; sine and cosine           |
+    | 39 - 50 | last_action    | -               | 1            | channel, by default                            |
+    | 51 - 74 | leg_kinematics | m, m/s          | 1, 40        | channel, by default; of the readings above     |
+    |         | history        | as above        | as above     | if `history` > 1: 34 numbers per older frame   |
+    | 75 - 80 | task           | 0 or 1          | 0 ... 1      | always; one-hot, K = len(tasks)                |
+
+    `leg_kinematics` is where the feet are and what each says of the trunk's velocity if it stands still, in the trunk
+    frame (`go1_mtl_gym.kinematics.leg_kinematics`).
 
     ## Rewards
 

@@ -13,7 +13,7 @@ from types import ModuleType
 
 import pytest
 
-from go1_mtl_gym import PAPER_TASKS
+from go1_mtl_gym import BUILT_IN_TASKS
 from trainers.utils.cli import interpreter
 
 ROOT = Path(__file__).parent.parent
@@ -76,23 +76,23 @@ def test_a_custom_expert_nods_without_falling(capsys):
     assert high - low == pytest.approx(2 * 0.24, abs=0.03)
 
 
-def test_a_new_gait_leaves_a_policy_that_quickstart_drives(tmp_path, capsys):
-    out = tmp_path / "policies" / "with_pace.zip"
+def test_a_new_gait_leaves_a_policy_that_quickstart_drives(passing_tasks, tmp_path, capsys):
+    out = tmp_path / "policies" / "with_amble.zip"
     options = ["--seconds", "4", "--steps", "20", "--episodes", "1", "--out", str(out)]
     assert example("new_gait").run(options) == 0
     printed = capsys.readouterr().out
-    assert "trot: success in 100 %" in printed and "pace: success in" in printed
+    assert "trot: success in 100 %" in printed and "amble: success in" in printed
     assert printed.endswith(
         "So little training is not enough to learn a gait; leave out --seconds and --steps to train in full.\n"
     )
-    assert example("quickstart").run([str(out), "--task", "pace", "--seconds", "0.2"]) == 0
+    assert example("quickstart").run([str(out), "--task", "amble", "--seconds", "0.2"]) == 0
 
 
 def test_a_policy_without_a_clock_is_made_and_saved(tmp_path, capsys):
     out = tmp_path / "phase_free.zip"
     assert example("phase_free").run(["--seconds", "1", "--steps", "10", "--episodes", "1", "--out", str(out)]) == 0
     printed = capsys.readouterr().out
-    assert "without one it sees     command, last_action and 10 frames" in printed
+    assert "without one it sees     command, last_action, leg_kinematics and 10 frames" in printed
     assert "So little training is not enough to read the phase" in printed
     assert example("quickstart").run([str(out), "--seconds", "0.2"]) == 0
 
@@ -100,7 +100,7 @@ def test_a_policy_without_a_clock_is_made_and_saved(tmp_path, capsys):
 def test_ppo_goes_on_from_the_policy(tmp_path, capsys):
     out = tmp_path / "ppo.zip"
     assert example("ppo").run(["--steps", "1", "--critic-steps", "40", "--episodes", "1", "--out", str(out)]) == 0
-    assert capsys.readouterr().out.count("success in 100 % of 1 episodes before") == len(PAPER_TASKS)
+    assert capsys.readouterr().out.count("success in 100 % of 1 episodes before") == len(BUILT_IN_TASKS)
     assert example("quickstart").run([str(out), "--seconds", "0.2"]) == 0
 
 
@@ -147,8 +147,8 @@ def test_a_policy_that_is_none_is_refused(tmp_path, capsys):
 
 
 def test_a_gait_that_the_policy_does_not_know_is_refused_with_those_that_it_knows(capsys):
-    message = refused("quickstart", ["--task", "pace"], capsys)
-    assert "'pace'" in message and all(f"'{task}'" in message for task in PAPER_TASKS)
+    message = refused("quickstart", ["--task", "hop"], capsys)
+    assert "'hop'" in message and all(f"'{task}'" in message for task in BUILT_IN_TASKS)
 
 
 @pytest.mark.parametrize("value", ["nan", "inf", "-1", "0", "long"])

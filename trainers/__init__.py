@@ -22,7 +22,9 @@ if TYPE_CHECKING:
     from trainers.data.collection import CollectJob, ShardMismatchError, collect, collect_all, watch
     from trainers.data.demonstrations import Demonstrations
     from trainers.data.environments import PerturbationConfig, make_env, make_venv
-    from trainers.data.operator import OperatorConfig
+    from trainers.data.mirror import mirrored
+    from trainers.data.operator import OperatorConfig, draw_plan
+    from trainers.data.operator_wrapper import OperatorWrapper
     from trainers.data.stateful import Learner
     from trainers.evaluation.certificate import Certificate
     from trainers.evaluation.certify import certify
@@ -67,6 +69,7 @@ _HOME = {
     "MultiHeadPolicy": "policies.multi_head",
     "MultiTaskLoss": "algorithms.losses",
     "OperatorConfig": "data.operator",
+    "OperatorWrapper": "data.operator_wrapper",
     "PerturbationConfig": "data.environments",
     "PhaseConfig": "algorithms.phase_free",
     "PhaseEstimator": "policies.phase_estimator",
@@ -77,6 +80,7 @@ _HOME = {
     "closest_task": "algorithms.add_task",
     "collect": "data.collection",
     "collect_all": "data.collection",
+    "draw_plan": "data.operator",
     "evaluate": "evaluation.closed_loop",
     "evaluate_transition": "evaluation.gait_transitions",
     "joint_target_figure": "evaluation.figures",
@@ -89,6 +93,7 @@ _HOME = {
     "make_env": "data.environments",
     "make_logger": "utils.logging",
     "make_venv": "data.environments",
+    "mirrored": "data.mirror",
     "offline_metrics": "evaluation.metrics",
     "paper_table": "utils.report",
     "phase_errors": "policies.phase_estimator",

@@ -22,6 +22,7 @@ from go1_mtl_gym import (
 )
 from go1_mtl_gym.actuation import ActionMap
 from go1_mtl_gym.sensing.observation import CHANNELS, UNITS, ObservationLayout
+from trainers.data.operator import MOVES, OperatorConfig
 from trainers.pipeline.command_line import job_parser
 from trainers.pipeline.config import JobConfig
 from trainers.pipeline.presets import PRESETS
@@ -36,19 +37,25 @@ CONTENT = {
     "gravity": "unit vector of gravity, trunk frame",
     "phase": "sine and cosine of the gait clock",
     "last_action": "the action of the last step",
+    "leg_kinematics": "feet, 4 x 3, and what each says of the trunk's velocity if it stands still, 4 x 3; trunk frame",
     "task": "one-hot task id, in the order of `tasks`",
 }
 """What the parts of an observation hold."""
 SETTINGS = {
+    "tasks": "gaits",
     "control_hz": "control rate [Hz]",
     "channels": "channels",
     "clean_s": "clean demonstrations per gait [s]",
     "perturbed_s": "perturbed demonstrations per gait [s]",
-    "randomized": "fraction of perturbed episodes with other physics",
-    "task_interval": "time between gait transitions in them [s]",
+    "hard_push_s": "perturbed and pushed hard, per gait [s]",
+    "randomized_s": "perturbed, with drawn physics and sensors, per gait [s]",
+    "operator": "an [operator](#the-operator) in perturbed ones, rounds and evaluation",
+    "hard_push_interval": "mean time between hard pushes in `hard_push_s` [s]",
     "held_out_s": "held-out demonstrations per gait [s]",
+    "mirror": "rows in the mirror as well",
     "rounds": "DAgger rounds",
     "dagger_s": "per gait and round [s]",
+    "randomized": "fraction of episodes in rounds with drawn physics and sensors",
     "width": "units per hidden layer",
     "normalization": "normalization",
     "batch_size": "rows per gradient step",
@@ -59,8 +66,14 @@ SETTINGS = {
     "episode_s": "duration of an episode [s]",
 }
 """Settings of the main job that its table shows, and what they are called there."""
-OF_ROUNDS = ("dagger_s", "round_steps")
-"""Those that mean nothing without a DAgger round."""
+NEEDS = {
+    "dagger_s": "rounds",
+    "round_steps": "rounds",
+    "randomized": "rounds",
+    "hard_push_s": "operator",
+    "hard_push_interval": "operator",
+}
+"""Those that mean nothing without another one."""
 RESULTS = Path(__file__).resolve().parents[1] / "results"
 """Where the results of the studies are."""
 
@@ -99,7 +112,7 @@ def gaits() -> str:
 
 def commands() -> str:
     """Ranges and limits of every task's commands."""
-    header = ("gait", "drawn: vx", "vy [m/s]", "yaw rate [rad/s]", "accepted: vx", "vy [m/s]", "yaw rate [rad/s]")
+    header = ("gait", "range: vx", "vy [m/s]", "yaw rate [rad/s]", "accepted: vx", "vy [m/s]", "yaw rate [rad/s]")
     return markdown(
         header,
         [(task.name, *(f"± {x:g}" for x in (*task.command_range, *task.command_limit))) for task in TASKS.values()],
@@ -218,13 +231,36 @@ def presets() -> str:
 
 
 def _setting(config: JobConfig, name: str) -> str:
-    if name in OF_ROUNDS and not config.rounds:
+    if name in NEEDS and not getattr(config, NEEDS[name]):
         return "-"
     value = getattr(config, name)
+    if isinstance(value, bool) or name == "operator":
+        return "yes" if value else "no"
     values = value if isinstance(value, tuple) else (value,)
     return (
         ", ".join(f"{each:g}" if isinstance(each, float) else str(each) for each in values if each is not None) or "-"
     )
+
+
+def operator_moves() -> str:
+    """What a hand does next, and how often."""
+    meaning, hands = described(OperatorConfig), OperatorConfig()
+    rows = []
+    for name, weight in zip(MOVES, hands.weights):
+        share, what = weight / hands.weights.sum(), re.sub(r"^(weight )?of ", "", meaning[name])
+        rows.append((f"`{name}`", f"{weight:g}", f"{share:.1%}", what))
+    return markdown(("move", "weight", "share of the moves", "what the hand does"), rows)
+
+
+def operator_settings() -> str:
+    """Everything else about an operator."""
+    meaning = described(OperatorConfig)
+    rows = [
+        (f"`{each.name}`", f"`{each.default!r}`", meaning[each.name])
+        for each in fields(OperatorConfig)
+        if each.name not in MOVES
+    ]
+    return markdown(("field", "default", "meaning"), rows)
 
 
 def studies() -> str:
@@ -266,6 +302,8 @@ TABLES: dict[str, Callable[[], str]] = {
         rewards,
         arguments,
         presets,
+        operator_moves,
+        operator_settings,
         job_options,
         studies,
     )

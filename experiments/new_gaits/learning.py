@@ -10,6 +10,7 @@ import numpy as np
 import trainers
 from experiments.study import option
 from experiments.training_runs import cloned, kept_policy, rows_of
+from go1_mtl_gym import PAPER_TASKS
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import number_in
 from trainers.data.environments import derive_seed
@@ -38,8 +39,12 @@ class NewGaitOptions:
     """
 
     gaits: tuple[str, ...] = option(("pace", "gallop"), "that the trained policy is to learn, each by itself")
+    base: JobConfig = option(
+        JobConfig(n_envs=1, tasks=PAPER_TASKS, phase_free_s=0.0),
+        "the main job of the trained policy, if none is given",
+    )
     job: JobConfig = option(
-        JobConfig(n_envs=1, clone_steps=3000, batch_size=512),
+        JobConfig(n_envs=1, perturbed_s=300.0, clone_steps=3000, batch_size=512),
         "clone_steps of every training, shards, evaluation, and in clean_s and perturbed_s the proportion of both; "
         "tasks, observation and network are the trained policy's",
     )
@@ -82,7 +87,8 @@ def demonstrations(job: JobConfig, seconds: float) -> list[trainers.CollectJob]:
     jobs = []
     for block, fraction in enumerate((clean, 1.0 - clean)):
         if fraction > 0:
-            perturbed = (job.perturbation(NOISE_RAD), job.randomization_kwargs) if block else (None, None)
+            world = job.randomization_kwargs(job.randomized)
+            perturbed = (job.perturbation(NOISE_RAD), world) if block else (None, None)
             pieces = replace(job, shard_s=fraction * job.shard_s)
             jobs += shard_jobs(pieces, fraction * seconds, block, *perturbed)
     return jobs
@@ -141,7 +147,7 @@ class GaitTraining:
     ) -> trainers.Demonstrations:
         """The rows, and those of a round in which the policy drives until the expert takes over [s]."""
         dagger = trainers.DAggerConfig(seconds, beta=0.0, takeover_rad=TAKEOVER_RAD, seed=self.seed)
-        env_kwargs = job.env_kwargs | {"tasks": policy.tasks} | job.randomization_kwargs
+        env_kwargs = job.env_kwargs | {"tasks": policy.tasks} | job.randomization_kwargs(job.randomized)
         rounds = self.folder / "rounds" / f"{self.gait}-{self.seconds:g}-{self.seed}"
         with closing(trainers.make_venv((self.gait,), 1, env_kwargs, job.perturbation(ROUND_NOISE_RAD))) as venv:
             base = rows.with_tasks(policy.tasks)
@@ -174,7 +180,7 @@ def rehearsal(base: trainers.MultiHeadPolicy, options: NewGaitOptions, folder: P
     path = folder / "rehearsal.npz"
     if not path.is_file():
         job = options.job_of(base, base.tasks, 0)
-        perturbation, world = job.perturbation(NOISE_RAD), job.randomization_kwargs
+        perturbation, world = job.perturbation(NOISE_RAD), job.randomization_kwargs(job.randomized)
         walks = [
             trainers.watch(base, task, derive_seed("rehearse", i), options.rehearsal_s, perturbation, **world)
             for i, task in enumerate(base.tasks)

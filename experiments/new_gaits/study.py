@@ -1,14 +1,14 @@
 """Pace and gallop for a trained policy, by seconds of demonstrations and by the way of learning them."""
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from matplotlib.figure import Figure
 
 import trainers
 from experiments import plots
-from experiments.agents import EXPERT, Agent, PolicyFile, shipped
+from experiments.agents import EXPERT, Agent, PolicyFile
 from experiments.new_gaits.learning import (
     METHODS,
     SCRATCH,
@@ -24,14 +24,36 @@ from experiments.results import Group, Results, group
 from experiments.student.episodes import counts, evaluate_gaits
 from experiments.study import ALL_GAITS, Cell, Metrics, Study
 from experiments.tables import count, markdown, number, percent
-from experiments.training_runs import QUICK_JOB, collect, rows_of
+from experiments.training_runs import QUICK_JOB, TrainedPolicy, TrainingRun, collect, rows_of
 from go1_mtl_gym import TASKS
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import one_of
-from trainers.pipeline.config import JobConfig
 
 NEW, OLD, BEFORE = "new gait", "old gait", "policy, before"
 COLORS = dict(zip(METHODS, (plots.BLUE, plots.PURPLE, plots.GREEN, plots.RED), strict=True))
+
+
+@dataclass(frozen=True)
+class Method(Agent):
+    """Who is measured with a trained policy at hand.
+
+    Attributes:
+        base: the trained policy.
+    """
+
+    base: PolicyFile = field(kw_only=True)
+
+    @property
+    def identity(self) -> str:
+        """The name, and the file of the trained policy."""
+        return repr((self.name, self.base.sha256))
+
+    @property
+    def origin(self) -> Any:
+        return self.base.origin
+
+    def prepare(self) -> float:
+        return self.base.prepare()
 
 
 class NewGaits(Study):
@@ -47,21 +69,32 @@ class NewGaits(Study):
     caption = "Survival and R2 of new gaits by seconds of demonstrations"
     full = NewGaitOptions()
     quick = NewGaitOptions(
-        ("pace",), JobConfig(n_envs=1, **QUICK_JOB), (2.0, 4.0), (0,), rehearsal_s=2.0, old_episodes=1
+        gaits=("pace",),
+        base=replace(full.base, **QUICK_JOB, rounds=0),
+        job=replace(full.job, **QUICK_JOB),
+        demonstrations_s=(2.0, 4.0),
+        seeds=(0,),
+        rehearsal_s=2.0,
+        old_episodes=1,
     )
     code = (*Study.code, "experiments.new_gaits.learning", "experiments.training_runs")
     takes_policies = True
 
     @property
     def base(self) -> PolicyFile:
-        """The trained policy.
+        """The trained policy: the one that is given, or that of a main job in the paper's gaits.
 
         Raises:
             InvalidInputError: if several are given.
         """
         if len(self.policies) > 1:
             raise InvalidInputError(f"one policy was expected, got {[agent.name for agent in self.policies]}")
-        return self.policies[0] if self.policies else shipped(BEFORE, "clocked")
+        run = TrainingRun(self.options.base, self.cache / "training")
+        return self.policies[0] if self.policies else TrainedPolicy(BEFORE, path=run.policy, run=run)
+
+    @property
+    def shared_options(self) -> Any:
+        return self.options, *(agent.identity for agent in self.policies)
 
     def agents(self) -> list[Agent]:
         """The methods, the expert, and the policy as it was.
@@ -69,14 +102,11 @@ class NewGaits(Study):
         Raises:
             InvalidInputError: if the policy has no heads, sees several frames, or a gait is not new to it.
         """
-        policy = self.base.load()
-        heads = isinstance(policy, trainers.MultiHeadPolicy) and not policy.pooled
-        if not heads or policy.contract.history != 1:
-            raise InvalidInputError(f"expected a policy with a head per gait that sees one frame, got {self.base.path}")
+        base = self.base
+        known = _tasks_of_given(base) if self.policies else self.options.base.tasks
         for gait in self.options.gaits:
-            one_of(gait, [name for name in TASKS if name not in policy.tasks], "a gait that is new to the policy")
-        kwargs = {"base": self.base.sha256}
-        return [Agent(EXPERT, env_kwargs=kwargs), *(Agent(name, env_kwargs=kwargs) for name in (BEFORE, *METHODS))]
+            one_of(gait, [name for name in TASKS if name not in known], "a gait that is new to the policy")
+        return [Method(name, base=base) for name in (EXPERT, BEFORE, *METHODS)]
 
     def cells(self, agent: Agent) -> list[Cell]:
         options = self.options
@@ -176,6 +206,19 @@ class NewGaits(Study):
             plots.log_ticks(ax, list(levels), "demonstrations of the new gait [s]")
         plots.legend(figure, axes[0, :1])
         return figure
+
+
+def _tasks_of_given(base: PolicyFile) -> tuple[str, ...]:
+    """The gaits of a policy that can learn another.
+
+    Raises:
+        InvalidInputError: if it has no heads, or sees several frames.
+    """
+    policy = base.load()
+    heads = isinstance(policy, trainers.MultiHeadPolicy) and not policy.pooled
+    if not heads or policy.contract.history != 1:
+        raise InvalidInputError(f"expected a policy with a head per gait that sees one frame, got {base.path}")
+    return policy.tasks
 
 
 def _by_method(results: Results) -> dict[str, dict[str, dict[float, Group]]]:

@@ -9,22 +9,34 @@ from experiments import plots
 from experiments.agents import Agent
 from experiments.results import Group, Results, distinct, group
 from experiments.student.commanded import DRAWN
-from experiments.student.episodes import drawn, other_gaits
+from experiments.student.episodes import drawn, operated, other_gaits
 from experiments.student.transitions import TransitionOptions, transition
 from experiments.study import EVALUATION_CODE, Cell, Metrics, Study, option
 from experiments.tables import count, mean, settings, share, table
 from experiments.training_runs import TrainedPolicy, TrainingRun, changed
+from go1_mtl_gym.env_config import DEFAULT_CHANNELS
+from trainers.data.operator import OperatorConfig
 from trainers.pipeline.config import JobConfig
 from trainers.pipeline.presets import PRESETS
 
-CHANGED, HELD_OUT = "changed world", "held out"
-"""Drawn commands in another world than the model's, and one-step errors on rows of the policy's own demonstrations."""
+CHANGED, HANDS, HELD_OUT = "changed world", "in hands", "held out"
+"""Drawn commands in another world than the model's, an operator's hands, and one-step errors on rows of the policy's
+own demonstrations."""
 CHANGED_WORLD = {"friction": 0.7, "payload_kg": 1.5, "action_delay_s": 0.01, "joint_friction": 0.5}
 """Arguments of `Go1Env`: the middles of the ranges of the study on robustness, together."""
 DEFAULT = "default, reduced"
+
+
+def _without(channel: str) -> tuple[str, ...]:
+    """The default channels but for one."""
+    return tuple(name for name in DEFAULT_CHANNELS if name != channel)
+
+
 REDUCED = {
     "clean_s": 30.0,
-    "perturbed_s": 120.0,
+    "perturbed_s": 75.0,
+    "hard_push_s": 30.0,
+    "randomized_s": 30.0,
     "held_out_s": 15.0,
     "rounds": 1,
     "dagger_s": 60.0,
@@ -35,19 +47,34 @@ REDUCED = {
     "episode_s": 10.0,
 }
 """Settings that all variants share but for their change."""
+TOGETHER_S = sum(REDUCED[name] for name in ("clean_s", "perturbed_s", "hard_push_s", "randomized_s"))
+"""Demonstrations per gait of every variant [s], whatever is in them."""
+WITHOUT_HARD = {"hard_push_s": 0.0, "perturbed_s": REDUCED["perturbed_s"] + REDUCED["hard_push_s"]}
+WITHOUT_RANDOM = {"randomized_s": 0.0, "perturbed_s": REDUCED["perturbed_s"] + REDUCED["randomized_s"]}
 VARIANTS: dict[str, dict[str, Any]] = {
     DEFAULT: {},
     "control rate 100 Hz": {"control_hz": 100},
     "kp 20": {"kp": 20.0},
     "kp 80": {"kp": 80.0},
     "three frames": {"history": 3},
-    "without command": {"channels": ("phase", "last_action")},
-    "without phase": {"channels": ("command", "last_action")},
-    "without last action": {"channels": ("command", "phase")},
-    "with gravity": {"channels": ("command", "gravity", "phase", "last_action")},
-    "no perturbed demonstrations": {"clean_s": 150.0, "perturbed_s": 0.0},
-    "no randomization": {"randomized": 0.0},
-    "no gait transitions": {"task_interval": None},
+    "without command": {"channels": _without("command")},
+    "without phase": {"channels": _without("phase")},
+    "without last action": {"channels": _without("last_action")},
+    "without leg kinematics": {"channels": _without("leg_kinematics")},
+    "with gravity": {"channels": (*DEFAULT_CHANNELS, "gravity")},
+    "without mirror": {"mirror": False},
+    "no perturbed demonstrations": {
+        "clean_s": TOGETHER_S,
+        "perturbed_s": 0.0,
+        "hard_push_s": 0.0,
+        "randomized_s": 0.0,
+    },
+    "no randomization": {"randomized": 0.0, **WITHOUT_RANDOM},
+    "drawn commands only": {"operator": None, **WITHOUT_HARD},
+    "no gait transitions": {"operator": OperatorConfig(task_interval=None)},
+    "without standing": {"operator": OperatorConfig(release=0.0, stand=0.0, starts_released=0.0)},
+    "without jerks": {"operator": OperatorConfig(jerk=0.0, full_and_back=0.0)},
+    "without hard pushes": {"hard_push_interval": None, **WITHOUT_HARD},
     "width 64": {"width": 64},
     "width 128": {"width": 128},
     "width 512": {"width": 512},
@@ -56,17 +83,18 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "three rounds": {"rounds": 3},
     "takeover at 0.1 rad": {"takeover_rad": 0.1},
 }
-"""Name -> what differs from the reduced job."""
+"""Name -> what differs from the reduced job; as many demonstrations as in that."""
 
 
 @dataclass(frozen=True)
 class AblationOptions:
-    """Drawn commands that change, in two worlds, and changes of gait."""
+    """Drawn commands that change, in two worlds, an operator's hands, and changes of gait."""
 
     training_seed: int = option(0, "of every variant")
     variants: tuple[str, ...] = option(tuple(VARIANTS), "which of VARIANTS")
     episodes: int = option(20, "per gait, in the model's world and in the changed one")
     changed_episodes: int = option(5, "per gait, in the model's world and in the changed one")
+    hands_episodes: int = option(20, "per gait, in an operator's hands that change no gait")
     seconds: float = option(20.0, "duration of each [s]")
     command_interval: float = option(5.0, "time between commands [s]")
     transitions: TransitionOptions = option(TransitionOptions(trials=3), "the changes of gait")
@@ -85,8 +113,8 @@ class Ablation(Study):
     note = (
         "Students of a reduced main job that differ in one setting: successful episodes with drawn commands per gait, "
         "mean velocity error, successful gait transitions of all pairs, successful episodes in a changed world "
-        f"({settings(CHANGED_WORLD)}), and one-step R2 on held-out rows of each one's own demonstrations. One "
-        "training seed: differences of a few episodes say nothing."
+        f"({settings(CHANGED_WORLD)}) and, where measured, in an operator's hands, and one-step R2 on held-out rows of "
+        "each one's own demonstrations. One training seed: differences of a few episodes say nothing."
     )
     caption = "Success, velocity error, gait transitions and changed world per variant"
     full = AblationOptions()
@@ -94,6 +122,7 @@ class Ablation(Study):
         variants=(DEFAULT, "no round"),
         episodes=1,
         changed_episodes=1,
+        hands_episodes=1,
         seconds=3.0,
         command_interval=2.0,
         transitions=TransitionOptions(1, 0.5, 2.5),
@@ -110,15 +139,17 @@ class Ablation(Study):
         return [
             Cell(task, condition)
             for task in tasks
-            for condition in (DRAWN, CHANGED, *(f"to {second}" for second in other_gaits(task, tasks)), HELD_OUT)
+            for condition in (DRAWN, CHANGED, HANDS, *(f"to {second}" for second in other_gaits(task, tasks)), HELD_OUT)
         ]
 
     def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:
         options = self.options
         if cell.condition == HELD_OUT:
             return dict(agent.origin.held_out[cell.task])
-        if cell.condition not in (DRAWN, CHANGED):
+        if cell.condition not in (DRAWN, CHANGED, HANDS):
             return transition(agent, cell, options.transitions, seed)
+        if cell.condition == HANDS:
+            return operated(agent.load(), cell.task, options.hands_episodes, options, seed)
         if cell.condition == CHANGED:
             return drawn(agent.load(), cell.task, options.changed_episodes, options, seed, **CHANGED_WORLD)
         return drawn(agent.load(), cell.task, options.episodes, options, seed)
@@ -132,6 +163,7 @@ class Ablation(Study):
             "velocity error [m/s]": mean("velocity_error", ".3f", condition=DRAWN),
             "gait transitions": lambda members: count(aggregate_variant(members)["transitions"]),
             "changed world": share(condition=CHANGED),
+            **({"in hands": share(condition=HANDS)} if results.of(condition=HANDS) else {}),
             "R2": mean("r2", ".4f", condition=HELD_OUT),
         }
         return table(group(results.records, "agent"), [""], columns)
@@ -142,6 +174,7 @@ class Ablation(Study):
             "error": "velocity error [m/s]",
             "transitions": "gait transitions",
             "changed": "changed world",
+            **({"hands": "in hands"} if results.of(condition=HANDS) else {}),
             "r2": "one-step R2",
         }
         variants = {name: aggregate_variant(records) for name, records in group(results.records, "agent").items()}
@@ -154,11 +187,12 @@ class Ablation(Study):
 
 
 def aggregate_variant(records: Group) -> dict[str, Any]:
-    """Of all gaits together: "success", "transitions" and "changed" as rates; means of "error" [m/s] and "r2"."""
+    """Of all gaits: rates of "success", "transitions", "changed" and "hands"; means of "error" [m/s] and "r2"."""
     return {
         "success": records.where(condition=DRAWN).rate(),
         "error": records.where(condition=DRAWN).mean("velocity_error"),
         "transitions": Group(record for record in records if record["condition"].startswith("to ")).rate(),
         "changed": records.where(condition=CHANGED).rate(),
+        "hands": records.where(condition=HANDS).rate(),
         "r2": records.where(condition=HELD_OUT).mean("r2"),
     }

@@ -60,7 +60,16 @@ class BudgetOptions:
     """
 
     job: JobConfig = option(
-        JobConfig(n_envs=1, randomized=0.0, task_interval=None, clone_steps=2500, episodes=10, episode_s=15.0),
+        JobConfig(
+            n_envs=1,
+            randomized=0.0,
+            operator=None,
+            mirror=False,
+            task_interval=None,
+            clone_steps=2500,
+            episodes=10,
+            episode_s=15.0,
+        ),
         "observation, network, clone_steps of every training, shards and evaluation; its seed is not used",
     )
     budgets_s: tuple[float, ...] = option(

@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import trainers
+from trainers.data.operator import OperatorConfig
 from trainers.pipeline.config import JobConfig
 
 
@@ -32,6 +33,20 @@ def drawn(policy: Any, task: str, episodes: int, options: Any, seed: int, **worl
     """
     given = {"command_interval": options.command_interval} | world
     return counts(trainers.evaluate(policy, task, episodes, options.seconds, seed, **given))
+
+
+def operated(policy: Any, task: str, episodes: int, options: Any, seed: int) -> dict[str, Any]:
+    """Counts of episodes in one gait in an operator's hands.
+
+    Args:
+        policy: or "expert".
+        task: the gait.
+        episodes: how many.
+        options: of a study, with `seconds` [s].
+        seed: of the episodes.
+    """
+    hands = OperatorConfig().of_one_gait()
+    return counts(trainers.evaluate(policy, task, episodes, options.seconds, seed, operator=hands))
 
 
 def evaluate_gaits(policy: Any, job: JobConfig, seed: int, **world: Any) -> dict[str, trainers.ClosedLoopResult]:

@@ -25,19 +25,20 @@ from experiments.student.transitions import TransitionOptions
 from experiments.study import ALL_GAITS, Cell, Metrics, Study, option
 from experiments.tables import mean, share, table
 from experiments.training_runs import QUICK_JOB, collect, kept_policy, rows_of
+from go1_mtl_gym.env_config import DEFAULT_CHANNELS
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.sensing.observation import ObservationLayout, SensorNoise
 from go1_mtl_gym.validation import one_of
 from trainers.pipeline.config import NOISE_RAD, JobConfig
-from trainers.pipeline.demonstrations import shard_jobs
+from trainers.pipeline.demonstrations import shard_jobs, training_jobs
 from trainers.pipeline.new_policy import new_policy
 from trainers.policies.phase_free import phase_free_layout
 
 WALKING, NOISY, TRANSITIONS, PHASE_ERROR = "walking", "noisy sensors", "gait transitions", "phase error"
 FRAMES = 10
 """That the phase is told from; the main job's default."""
-FELT = ("command", "last_action")
-CLOCKED = ("command", "phase", "last_action")
+CLOCKED = DEFAULT_CHANNELS
+FELT = tuple(name for name in CLOCKED if name != "phase")
 
 
 @dataclass(frozen=True)
@@ -79,11 +80,10 @@ class PhaseFreeOptions:
     """
 
     job: JobConfig = option(
-        JobConfig(n_envs=1, history=FRAMES),
+        JobConfig(n_envs=1, history=FRAMES, mirror=False),
         "rows, network, clone_steps of every training, and evaluation; it records all that any variant sees",
     )
     held_out_s: float = option(30.0, "perturbed demonstrations that the phase's error is measured on, per gait [s]")
-    noise_rad: float = option(NOISE_RAD, "largest action noise in perturbed demonstrations [rad]")
     transitions: TransitionOptions = option(TransitionOptions(trials=3), "changes of gait, for every ordered pair")
     noisy_s: float = option(10.0, "duration of the episodes with noisy sensors [s]")
     given_episodes: int = option(100, "of finished policies that are measured too")
@@ -98,17 +98,15 @@ class PhaseFreeOptions:
 
     @property
     def training(self) -> list[trainers.CollectJob]:
-        """Clean and perturbed demonstrations, as the main job's."""
-        return shard_jobs(self.job, self.job.clean_s, 0) + self._perturbed(self.job.perturbed_s, 1)
+        """Those of the main job."""
+        return training_jobs(self.job)
 
     @property
     def held_out(self) -> list[trainers.CollectJob]:
         """Perturbed demonstrations of other seeds."""
-        return self._perturbed(self.held_out_s, 2)
-
-    def _perturbed(self, seconds: float, block: int) -> list[trainers.CollectJob]:
         job = self.job
-        return shard_jobs(job, seconds, block, job.perturbation(self.noise_rad), job.randomization_kwargs)
+        world = job.randomization_kwargs(job.randomized)
+        return shard_jobs(job, self.held_out_s, 2, job.perturbation(NOISE_RAD), world)
 
 
 class PhaseFree(Study):
@@ -124,9 +122,7 @@ class PhaseFree(Study):
     )
     caption = "Success and error of the phase, of students without a clock"
     full = PhaseFreeOptions()
-    quick = PhaseFreeOptions(
-        replace(full.job, **QUICK_JOB), 2.0, NOISE_RAD, TransitionOptions(1, 0.5, 2.5), 2.5, 1, (0.2,)
-    )
+    quick = PhaseFreeOptions(replace(full.job, **QUICK_JOB), 2.0, TransitionOptions(1, 0.5, 2.5), 2.5, 1, (0.2,))
     code = (*Study.code, "experiments.student.phase", "experiments.training_runs")
     takes_policies = True
 

@@ -15,7 +15,7 @@ CONSTRUCTION = [
     ({"tasks": ()}, r"tasks must be a sequence.*got \(\)"),
     ({"tasks": ("trot", "moonwalk")}, r"got 'moonwalk'"),
     ({"tasks": ("trot", "trot")}, r"differ.*'trot', 'trot'"),
-    ({"channels": ("velocity",)}, r"channel must be one of.*'last_action'; got 'velocity'"),
+    ({"channels": ("velocity",)}, r"channel must be one of.*'leg_kinematics'; got 'velocity'"),
     ({"channels": "command"}, r"channels must be a sequence.*got 'command'"),
     ({"history": 0}, r"history must be an integer from 1 to 50, got 0"),
     ({"history": 1.5}, r"history.*1.5"),

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import go1_mtl_gym
-from go1_mtl_gym import PAPER_TASKS, TASKS, Gait, Task, env_id, register_task
+from go1_mtl_gym import BUILT_IN_TASKS, TASKS, Gait, Task, env_id, register_task
 from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.errors import InvalidInputError
 from trainers import CollectJob, Demonstrations, collect_all, evaluate, make_venv
@@ -39,7 +39,7 @@ def test_environments_made_before_keep_their_tasks(passing_tasks):
     old = Go1Env(None, tasks=tuple(TASKS))
     register_task(dataclasses.replace(AMBLE, name="late"))
     assert len(old.tasks) == before and "late" not in pickle.loads(pickle.dumps(old)).tasks
-    assert Go1Env("late").tasks == (*PAPER_TASKS, "late") and "late" not in Go1Env("trot").tasks
+    assert Go1Env("late").tasks == (*BUILT_IN_TASKS, "late") and "late" not in Go1Env("trot").tasks
 
 
 def test_equal_tasks_may_be_registered_again_and_others_of_the_name_may_not(amble):

@@ -17,6 +17,8 @@ from go1_mtl_gym.sensing.observation import FRAME_SIZE, ObservationLayout
 from trainers.data.environments import ExpertAccess, PerturbationConfig
 
 HIPS, THIGHS, KNEES = slice(0, 7, 3), slice(1, 12, 3), slice(2, 12, 3)
+SPEED = 2.0
+"""Velocity that a hip's action of 1 stands for [m/s, rad/s]; more than any task's `command_range`."""
 SIZE = 34 + 3 + 2 + 12
 """Entries of the observation without the task id: proprioception, command, phase, last action."""
 
@@ -34,7 +36,7 @@ class StubState:
 def linear_expert(state: StubState) -> np.ndarray:
     """Hips follow the command, thighs lift in turn, knees damp; shape (12,), in [-1, 1]."""
     action = np.zeros(12)
-    action[HIPS] = state.command
+    action[HIPS] = state.command / SPEED
     action[THIGHS] = 0.9 * np.sin(2 * np.pi * (state.phase + state.offsets))
     action[KNEES] = -0.5 * state.q[KNEES]
     return action
@@ -126,7 +128,7 @@ class StubEnv(gymnasium.Env):
             "task": self.task.name,
             "command": self.command.copy(),
             "filtered_command": self.filtered.copy(),
-            "base_velocity": self.last_action[HIPS].copy(),
+            "base_velocity": SPEED * self.last_action[HIPS],
             "contacts": self.last_action[THIGHS] <= 0.5,
             "phase": self.phase,
             "fallen": fallen,

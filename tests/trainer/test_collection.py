@@ -10,7 +10,7 @@ import pytest
 
 from go1_mtl_gym import TASKS, DomainRandomization
 from go1_mtl_gym.errors import InvalidInputError
-from tests.trainer.stub_env import HIPS, SIZE, THIGHS, StubEnv, make_stub
+from tests.trainer.stub_env import HIPS, SIZE, SPEED, THIGHS, StubEnv, make_stub
 from trainers import CollectJob, Demonstrations, PerturbationConfig, ShardMismatchError, collect, collect_all, watch
 from trainers.data.collection import CollectionError
 
@@ -23,7 +23,7 @@ def trot_labels(obs: np.ndarray) -> np.ndarray:
     sine, cosine = obs[:, LAYOUT["phase"]].T
     phase = np.arctan2(sine, cosine)[:, None] + 2 * np.pi * offsets
     labels = np.zeros((len(obs), 12))
-    labels[:, HIPS] = obs[:, LAYOUT["command"]]
+    labels[:, HIPS] = obs[:, LAYOUT["command"]] / SPEED
     labels[:, THIGHS] = 0.9 * np.sin(phase)
     labels[:, 2::3] = -0.5 * obs[:, LAYOUT["q"]][:, 2::3]
     return labels

@@ -8,7 +8,7 @@ import pytest
 
 from go1_mtl_gym import TASKS
 from go1_mtl_gym.errors import InvalidInputError
-from tests.trainer.stub_env import HIPS, THIGHS, StubEnv, linear_expert, make_stub
+from tests.trainer.stub_env import HIPS, SPEED, THIGHS, StubEnv, linear_expert, make_stub
 from trainers import evaluate
 from trainers.data.environments import ExpertAccess
 
@@ -27,7 +27,7 @@ class Scripted:
         self.calls += 1
         phase = np.arctan2(*obs[37:39]) / (2 * np.pi)
         action = np.zeros(12)
-        action[HIPS], action[THIGHS] = obs[34:37], 0.9 * np.sin(2 * np.pi * (phase + self.offsets))
+        action[HIPS], action[THIGHS] = obs[34:37] / SPEED, 0.9 * np.sin(2 * np.pi * (phase + self.offsets))
         return self.spoil(action).astype(np.float32), None
 
 
@@ -37,7 +37,7 @@ def still(action):
 
 
 def drifting(action):
-    action[0] += 0.2
+    action[0] += 0.2 / SPEED
     return action
 
 
@@ -99,7 +99,7 @@ def test_a_standing_robot_may_make_one_step_and_not_two(every, success):
 
 def test_steps_are_counted_against_the_time_in_which_the_clock_ran():
     def stepping_when_told(action):
-        if np.abs(action[HIPS]).max() < 0.05:
+        if np.abs(SPEED * action[HIPS]).max() < 0.05:
             action[THIGHS] = 0.0
         return action
 

@@ -22,6 +22,7 @@ from trainers import (
     offline_metrics,
 )
 from trainers.algorithms.add_task import trunk_features
+from trainers.data.mirror import mirrored
 from trainers.policies.phase_free import phase_free_layout
 
 TASKS = (*PAPER_TASKS, "pace")
@@ -178,6 +179,20 @@ def test_alone_the_new_head_learns_and_nothing_else_moves(trained, pace):
     np.testing.assert_array_equal(
         grown.predict(observations([0, 3, 1, 2], 5), deterministic=True)[0], trained.predict(obs, deterministic=True)[0]
     )
+
+
+def test_the_new_head_learns_from_the_mirror_too(trained, pace):
+    """Rows that all step from the left; in the mirror they step from the right."""
+    one_sided = pace.take(pace.obs[:, pace.contract.slices["command"]][:, 1] > 0.0)
+    errors = []
+    for mirror in (False, True):
+        grown = trained.add_task("pace", seed=2)
+        before = weights(grown)
+        learn_task(grown, one_sided, dataclasses.replace(QUICK, mirror=mirror))
+        image = mirrored(one_sided).with_tasks(TASKS)
+        errors.append(offline_metrics(grown, image)["pace"]["mse"])
+        assert all(name.startswith("actor.heads.4.") for name in changed(before, grown))
+    assert errors[1] < 0.8 * errors[0]
 
 
 def test_with_rehearsal_all_learn_and_old_tasks_are_kept(trained, pace, demos):

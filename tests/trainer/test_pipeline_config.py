@@ -76,13 +76,18 @@ def test_the_command_line_gives_the_same():
 
 
 def test_every_shard_has_a_seed_of_its_own_and_shorter_runs_are_the_beginning_of_longer_ones():
-    config = JobConfig(clean_s=30.0, perturbed_s=45.0, held_out_s=15.0, tasks=("trot", "walk"), seed=2)
+    amounts = {"clean_s": 30.0, "perturbed_s": 45.0, "hard_push_s": 15.0, "randomized_s": 30.0, "held_out_s": 15.0}
+    config = JobConfig(**amounts, tasks=("trot", "walk"), seed=2)
     train, held_out = training_jobs(config), held_out_jobs(config)
-    assert len(train) == 2 * (2 + 3) and len(held_out) == 2
-    assert len({(job.task, job.seed) for job in train + held_out}) == 12
-    assert [job.perturbation is None for job in train] == [True] * 4 + [False] * 6
+    assert len(train) == 2 * (2 + 3 + 1 + 2) and len(held_out) == 2
+    assert len({(job.task, job.seed) for job in train + held_out}) == 18
+    assert [job.perturbation is None for job in train] == [True] * 4 + [False] * 12
+    assert ["randomization" in job.env_kwargs for job in train] == [False] * 12 + [True] * 4
+    pushed_hard = [job.perturbation.operator.hard_push_interval for job in train[4:]]
+    assert pushed_hard == [None] * 6 + [4.0] * 2 + [None] * 4
     assert all(job.perturbation is None for job in held_out)
-    assert training_jobs(config.with_options(clean_s=15.0, perturbed_s=0.0)) == train[:2]
+    less = config.with_options(clean_s=15.0, perturbed_s=0.0, hard_push_s=0.0, randomized_s=0.0)
+    assert training_jobs(less) == train[:2]
     others = training_jobs(config.with_options(seed=3))
     assert not {job.seed for job in train + held_out} & {job.seed for job in others}
 
@@ -95,8 +100,14 @@ def test_what_follows_for_the_stages():
     assert not config.with_options(history=2).has_clock
     assert config.with_options(channels=()).is_literal
     assert config.perturbation(0.05).task_interval == (2.0, 6.0)
-    assert config.with_options(tasks=("trot",)).perturbation(0.05).task_interval is None, "one gait cannot change"
-    assert config.with_options(randomized=0).randomization_kwargs == {}
+    assert config.perturbation(0.05).operator == config.operator and config.operator.task_interval is not None
+    alone = config.with_options(tasks=("trot",)).perturbation(0.05)
+    assert alone.task_interval is alone.operator.task_interval is None, "one gait cannot change"
+    assert config.with_options(operator=None).perturbation(0.05, 4.0).operator is None
+    assert config.randomization_kwargs(0.3)["randomization"].fraction == 0.3
+    assert config.randomization_kwargs(0.0) == {}
+    assert config.bc.mirror and not config.with_options(mirror=False).bc.mirror
+    assert not config.with_options(history=2).bc.mirror, "rows of several frames have no mirror image"
 
 
 def test_the_default_preset_is_the_one_whose_results_are_published():

@@ -5,7 +5,7 @@ import zipfile
 import pytest
 
 import trainers
-from go1_mtl_gym import PAPER_TASKS
+from go1_mtl_gym import BUILT_IN_TASKS
 from go1_mtl_gym.errors import InvalidInputError
 from trainers import MultiHeadPolicy, PhaseFreePolicy
 from trainers.policies.pretrained import FOLDER, PRETRAINED
@@ -38,7 +38,7 @@ def test_the_files_hold_json_and_safetensors_only(name):
 def test_they_are_read_ready_to_act(name):
     policy = trainers.load_pretrained(name)
     assert type(policy) is CLASSES[name] and not policy.training
-    assert tuple(policy.env_kwargs["tasks"]) == PAPER_TASKS
+    assert tuple(policy.env_kwargs["tasks"]) == BUILT_IN_TASKS
     assert ("phase" in policy.env_kwargs["channels"]) == (name == "clocked")
 
 
@@ -47,7 +47,7 @@ def test_the_default_is_the_one_with_a_clock():
 
 
 @EVERY
-@pytest.mark.parametrize("task", PAPER_TASKS)
+@pytest.mark.parametrize("task", BUILT_IN_TASKS)
 def test_they_walk_in_the_real_environment(name, task):
     result = trainers.evaluate(trainers.load_pretrained(name), task, 1, 4.0, commands=[(0.3, 0.0, 0.0)])
     assert result.survival_rate == 1.0 and result.velocity_error < 0.15, result

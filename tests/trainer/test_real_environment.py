@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from go1_mtl_gym import PAPER_TASKS, TASKS
+from go1_mtl_gym import BUILT_IN_TASKS, TASKS
 from trainers import (
     BCConfig,
     DAggerConfig,
@@ -29,7 +29,7 @@ def test_expert_walks_in_every_gait():
 
 def test_labels_are_the_expert_at_the_state_before_the_step():
     demos = collect("trot", (0.4, 0.0, 0.0), 5, 0.6, PerturbationConfig(noise_rad=0.02), KWARGS)
-    assert len(demos) == 30 and demos.tasks == PAPER_TASKS
+    assert len(demos) == 30 and demos.tasks == BUILT_IN_TASKS
     env = make_env("trot", **KWARGS)
     layout = env.unwrapped.layout
     executed = demos.obs[1:, layout.slices["last_action"]]

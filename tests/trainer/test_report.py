@@ -51,6 +51,12 @@ def test_the_phase_free_student_stands_below_the_student_and_without_one_step_er
     assert phase_free[2:] == ["-", "-", "-", "19/20", "20/20", "0.031", "2.50"]
 
 
+def test_episodes_in_hands_have_a_column_where_there_were_any():
+    scores = {"expert": EXPERT, "multi_head": STUDENT | {"operator_success_rate": 0.9}}
+    header, _, expert, student = cells(results_table({"tasks": {"trot": scores}}))
+    assert header[-1] == "in hands" and (expert[-1], student[-1]) == ("-", "18/20")
+
+
 def test_undefined_values_are_dashes_and_unknown_learners_keep_their_name():
     none = dict.fromkeys(STUDENT, None) | {"survival_rate": 0.0, "episodes": 4}
     literal, other = cells(results_table({"tasks": {"jump": {"mine": {}, "paper_literal": none}}}))[2:]

@@ -5,7 +5,7 @@ import pytest
 
 from go1_mtl_gym import PAPER_TASKS, TASKS
 from go1_mtl_gym.errors import InvalidInputError
-from tests.trainer.stub_env import HIPS, THIGHS, StubEnv, make_stub
+from tests.trainer.stub_env import HIPS, SPEED, THIGHS, StubEnv, make_stub
 from trainers import evaluate_transition
 from trainers.data.environments import ExpertAccess
 
@@ -25,7 +25,7 @@ class Both:
         task = PAPER_TASKS[obs[-4:].argmax()]
         turn = np.arctan2(*obs[37:39]) / (2 * np.pi) + np.array(TASKS[task].gait.offsets)
         action = np.zeros(12)
-        action[HIPS], action[THIGHS] = obs[34:37], 0.9 * np.sin(2 * np.pi * turn)
+        action[HIPS], action[THIGHS] = obs[34:37] / SPEED, 0.9 * np.sin(2 * np.pi * turn)
         return self.spoil(action, task, self.step).astype(np.float32), state
 
 

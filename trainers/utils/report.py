@@ -25,6 +25,8 @@ RESULT_COLUMNS = {
     "in hands": ("operator_success_rate", "share"),
 }
 """Header -> key in ``metrics.json`` and how its value is written."""
+IF_MEASURED = ("in hands",)
+"""Columns that a table without such values does without."""
 PAPER_R2 = {
     "trot": (0.919537, 0.770130, "simulation"),
     "jump": (0.892613, 0.796875, "simulation"),
@@ -44,12 +46,16 @@ def results_table(metrics: Mapping[str, Any]) -> str:
     Raises:
         InvalidInputError: if there are no tasks in it.
     """
-    rows = []
-    for task, scores in _tasks(metrics).items():
+    tasks, rows = _tasks(metrics), []
+    known = {key for scores in tasks.values() for learner in scores.values() for key in learner}
+    columns = {
+        name: (key, how) for name, (key, how) in RESULT_COLUMNS.items() if name not in IF_MEASURED or key in known
+    }
+    for task, scores in tasks.items():
         for learner in _learners(scores):
-            cells = [_cell(scores[learner], key, how) for key, how in RESULT_COLUMNS.values()]
+            cells = [_cell(scores[learner], key, how) for key, how in columns.values()]
             rows.append([task, LEARNERS.get(learner, learner), *cells])
-    return markdown(["gait", "learner", *RESULT_COLUMNS], rows, text_columns=2)
+    return markdown(["gait", "learner", *columns], rows, text_columns=2)
 
 
 def paper_table(metrics: Mapping[str, Any]) -> str:
