@@ -107,7 +107,6 @@ def test_what_follows_for_the_stages():
     assert config.randomization_kwargs(0.3)["randomization"].fraction == 0.3
     assert config.randomization_kwargs(0.0) == {}
     assert config.bc.mirror and not config.with_options(mirror=False).bc.mirror
-    assert not config.with_options(history=2).bc.mirror, "rows of several frames have no mirror image"
 
 
 def test_the_default_preset_is_the_one_whose_results_are_published():

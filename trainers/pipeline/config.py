@@ -119,7 +119,7 @@ class JobConfig:
     phase_free_s: float = _from(0, 240.0)
     phase_free_history: int = _from(1, 10)
     phase_free_steps: int = _from(1, 4000)
-    episodes: int = _from(1, 20)
+    episodes: int = _from(1, 10)
     episode_s: float = _from(0, 30.0, above=True)
     command_interval: float = _from(0, 5.0, above=True)
     round_episodes: int = _from(1, 2)
