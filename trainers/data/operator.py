@@ -42,7 +42,8 @@ class OperatorConfig:
         move_s: shortest and longest duration of a move [s].
         stand_s: the same of a long stand [s].
         starts_released: probability that an episode begins with a stick that nobody holds.
-        deflection: share of a task's `command_range` that a full deflection asks for.
+        deflection: share of a task's `command_range` that a full deflection asks for; above 1 it goes beyond, as far as
+            `command_limit`.
         task_interval: shortest and longest time between changes of gait [s], or None for one gait per episode.
         double_change: probability that a change of gait is followed by another one within a second.
         braking_change: probability that letting go comes with a change of gait in the half second after it.
@@ -84,7 +85,7 @@ class OperatorConfig:
             raise InvalidInputError(f"at least one move of the operator needs a weight above 0, got {self}")
         for name in ("starts_released", "double_change", "braking_change"):
             set_field(name, number_in(getattr(self, name), 0.0, 1.0, name))
-        set_field("deflection", number_in(self.deflection, 0.0, 1.0, "deflection"))
+        set_field("deflection", number_in(self.deflection, 0.0, 3.0, "deflection"))
         set_field("push", number_in(self.push, 0.0, 5.0, "push [m/s]"))
         for name in ("push_interval", "hard_push_interval"):
             if getattr(self, name) is not None:

@@ -5,7 +5,7 @@ from typing import Any, cast
 import gymnasium
 import numpy as np
 
-from go1_mtl_gym import TASKS, Go1Env
+from go1_mtl_gym import TASKS, Go1Env, Task
 from go1_mtl_gym.errors import InvalidInputError
 from trainers.data.operator import OperatorConfig, OperatorPlan, Push, draw_plan
 
@@ -88,8 +88,11 @@ class OperatorWrapper(gymnasium.Wrapper):
 
     def _move_stick(self, plan: OperatorPlan, time_s: float) -> None:
         env = self._go1
-        reach = self.operator.deflection * np.array(env.requested_task.command_range)
-        env.set_command(plan.stick(time_s) * reach)
+        env.set_command(plan.stick(time_s) * self._reach(env.requested_task))
+
+    def _reach(self, task: Task) -> np.ndarray:
+        """What a full deflection asks of a task: |vx|, |vy| [m/s] and |yaw rate| [rad/s], shape (3,)."""
+        return np.minimum(self.operator.deflection * np.array(task.command_range), task.command_limit)
 
     def _push(self, push: Push) -> None:
         env = self._go1
@@ -100,8 +103,6 @@ class OperatorWrapper(gymnasium.Wrapper):
     def _change_task(self, task: str) -> None:
         """Press a button; a command beyond the new task's reach is brought to its border first."""
         env = self._go1
-        reach = np.minimum(
-            self.operator.deflection * np.array(TASKS[task].command_range), env.requested_task.command_limit
-        )
+        reach = np.minimum(self._reach(TASKS[task]), env.requested_task.command_limit)
         env.set_command(np.clip(env.command, -reach, reach))
         env.set_task(task)

@@ -57,6 +57,8 @@ class JobConfig:
         clean_s, perturbed_s, hard_push_s, randomized_s, held_out_s: demonstrations: undisturbed, perturbed, perturbed
             and pushed hard, perturbed with physics and sensors that are drawn, and undisturbed for the R2.
         operator: whose hands drive in perturbed demonstrations, rounds and evaluation; None draws commands and gaits.
+        margin: how far the operator of demonstrations and rounds reaches, as a multiple of the deflection that the
+            policy is evaluated with.
         hard_push_interval: mean time between pushes at the edge of what the expert bears in `hard_push_s` [s]; in
             rounds they come half as often. None pushes hard nowhere.
         randomized: fraction of the episodes in rounds whose physics and sensors are drawn, by the ranges of
@@ -101,6 +103,7 @@ class JobConfig:
     hard_push_s: float = _from(0, 90.0)
     randomized_s: float = _from(0, 90.0)
     operator: OperatorConfig | None = OperatorConfig()
+    margin: float = _from(0, 1.2, above=True)
     hard_push_interval: float | None = _from(0, 4.0, above=True)
     held_out_s: float = _from(0, 60.0, above=True)
     randomized: float = _from(0, 0.3)
