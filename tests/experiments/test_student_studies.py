@@ -224,11 +224,13 @@ def test_a_variants_gaits_are_taken_together():
         record("walk", "drawn", trials=20, succeeded=10, velocity_error=0.04),
         record("trot", "to walk", trials=3, succeeded=1, velocity_error=0.9),
         record("walk", "changed world", trials=5, succeeded=4, velocity_error=0.9),
+        record("walk", "in hands", trials=20, succeeded=17, velocity_error=0.9),
         record("trot", "held out", r2=0.9),
         record("walk", "held out", r2=0.8),
     ]
     found = ablation.aggregate_variant(ablation.Group(records))
     assert (found["success"], found["transitions"], found["changed"]) == ((30, 40), (1, 3), (4, 5))
+    assert found["hands"] == (17, 20)
     assert found["error"] == pytest.approx(0.03) and found["r2"] == pytest.approx(0.85)
 
 
