@@ -67,7 +67,7 @@ def tables(results: Results) -> list[str]:
     """Paragraphs of the page of the main job."""
     metrics = {"tasks": _by_task(results)}
     return [
-        "![The student in four gaits](gaits.gif)",
+        "![The student in its gaits](gaits.gif)",
         "## Student and baselines",
         results_table(metrics),
         "![Joint targets of the student and of the expert](joint_targets.png)",

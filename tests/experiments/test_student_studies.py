@@ -110,8 +110,8 @@ class Skittle:
         self.limit, self.episodes, self.control_hz = limit, 0, control_hz
         self.unwrapped, self.state = self, SimpleNamespace(rpy=np.array([0.0, 0.0, np.pi / 2]))
         self.pushes, self.closed = [], False
-        self.info = {"command": (0.3, 0.0, 0.0)} | dict.fromkeys(("base_velocity", "filtered_command"), np.zeros(3))
-        self.info["contacts"] = np.ones(4, bool)
+        self.info = {"task": "trot", "command": (0.3, 0.0, 0.0), "contacts": np.ones(4, bool)}
+        self.info |= dict.fromkeys(("base_velocity", "filtered_command"), np.zeros(3))
 
     def reset(self, seed, options):
         self.episodes, self.steps, self.pushed_at = self.episodes + 1, 0, None
@@ -224,11 +224,13 @@ def test_a_variants_gaits_are_taken_together():
         record("walk", "drawn", trials=20, succeeded=10, velocity_error=0.04),
         record("trot", "to walk", trials=3, succeeded=1, velocity_error=0.9),
         record("walk", "changed world", trials=5, succeeded=4, velocity_error=0.9),
+        record("walk", "in hands", trials=20, succeeded=17, velocity_error=0.9),
         record("trot", "held out", r2=0.9),
         record("walk", "held out", r2=0.8),
     ]
     found = ablation.aggregate_variant(ablation.Group(records))
     assert (found["success"], found["transitions"], found["changed"]) == ((30, 40), (1, 3), (4, 5))
+    assert found["hands"] == (17, 20)
     assert found["error"] == pytest.approx(0.03) and found["r2"] == pytest.approx(0.85)
 
 
@@ -254,11 +256,11 @@ def test_budgets_are_whole_shards_and_double(budgets):
 def test_nobody_is_perturbed_but_as_said_and_budgets_are_nested():
     options = budget.BudgetOptions()
     small, large = (options.demonstrations(1, True, seconds) for seconds in (15.0, 60.0))
-    assert len(small) == 4 and len(large) == 16 and large[:4] == small
+    assert len(small) == 6 and len(large) == 24 and large[:6] == small
     assert all(job.perturbation.noise_rad == 0.06 and "randomization" not in job.env_kwargs for job in large)
     clean, other = options.demonstrations(1, False, 60.0), options.demonstrations(0, False, 60.0)
     assert all(job.perturbation is None for job in clean)
-    assert len({(job.task, job.seed) for job in (*large, *clean, *other)}) == 48
+    assert len({(job.task, job.seed) for job in (*large, *clean, *other)}) == 72
 
 
 def test_every_policy_starts_from_the_same_weights_and_sees_its_budget(tmp_path, monkeypatch):

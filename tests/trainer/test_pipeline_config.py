@@ -104,6 +104,10 @@ def test_what_follows_for_the_stages():
     alone = config.with_options(tasks=("trot",)).perturbation(0.05)
     assert alone.task_interval is alone.operator.task_interval is None, "one gait cannot change"
     assert config.with_options(operator=None).perturbation(0.05, 4.0).operator is None
+    assert config.round_perturbation.operator.hard_push_interval == 8.0
+    gentle = config.with_options(hard_push_interval=None)
+    assert gentle.round_perturbation.operator.hard_push_interval is None
+    assert len(training_jobs(config)) - len(training_jobs(gentle)) == 6 * 6
     assert config.randomization_kwargs(0.3)["randomization"].fraction == 0.3
     assert config.randomization_kwargs(0.0) == {}
     assert config.bc.mirror and not config.with_options(mirror=False).bc.mirror

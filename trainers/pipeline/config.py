@@ -5,7 +5,7 @@ import operator
 import os
 from collections.abc import Mapping, Sequence
 from numbers import Real
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -277,7 +277,7 @@ class JobConfig:
 
 def _number(value: Any, field: "dataclasses.Field[Any]") -> int | float | None:
     """A field's value as Python's own number, checked against the field's lower bound."""
-    if value is None and "None" in str(field.type):
+    if value is None and type(None) in get_args(field.type):
         return None
     low, above = field.metadata["low"], field.metadata["above"]
     kind = "an integer" if field.type is int else "a number"
