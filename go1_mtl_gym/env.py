@@ -176,7 +176,7 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
         episode = self._running("step")
         applied = np.clip(finite_vector(action, 12, "action"), -1.0, 1.0)
         target, early = self.action_map.to_radians(applied), episode.sensor_faults.early
-        reading = self._simulation.step(target, PHYSICS_HZ // self.control_hz, early)
+        reading = self._simulation.step_and_read(target, PHYSICS_HZ // self.control_hz, early)
         episode.advance(applied, self.control_s)
         state = self.state
         ended = how_it_ended(state, self._simulation.stable, episode.steps >= self.config.episode_steps)

@@ -17,7 +17,6 @@ from experiments.tables import first, mean
 from go1_mtl_gym import TASKS, Gait, robot
 from go1_mtl_gym.actuation import PHYSICS_HZ
 from go1_mtl_gym.gaits import next_phase
-from go1_mtl_gym.sensing.sensor_faults import Reading
 
 SATURATED = 0.999
 """A joint is at its limit from this fraction of it."""
@@ -106,14 +105,14 @@ class Recorder:
 
     def __enter__(self) -> "Recorder":
         self._simulation = self.lab.env.simulation
-        self._step: Callable[[np.ndarray, int], Reading] = self._simulation.step
+        self._step: Callable[[np.ndarray, int], None] = self._simulation.step
         self._simulation.step = self._recorded
         return self
 
     def __exit__(self, *_: object) -> None:
         del self._simulation.step  # the class's own shows again
 
-    def _recorded(self, target: np.ndarray, physics_steps: int, read_early: int = 0) -> Reading:
+    def _recorded(self, target: np.ndarray, physics_steps: int) -> None:
         begun = self.lab.env.state  # the clock moves on after the physics
         for i in range(physics_steps):
             self._step(target, 1)
@@ -130,7 +129,6 @@ class Recorder:
             }
             for name, value in seen.items():
                 self.rows.setdefault(name, []).append(np.array(value))
-        return self._simulation.read()
 
     def series(self, skip_s: float) -> dict[str, np.ndarray]:
         """Name -> array with one row per millisecond, without the first seconds."""

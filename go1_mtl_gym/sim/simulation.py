@@ -94,28 +94,32 @@ class Simulation:
         self._delay.reset(self.data.ctrl)
         self.physics_params = physics_params
 
-    def step(self, target: np.ndarray, physics_steps: int, read_early: int = 0) -> Reading:
+    def step(self, target: np.ndarray, physics_steps: int) -> None:
         """Command joint targets [rad], shape (12,), for a number of 1 ms steps; the delay decides when they are held.
 
         Sensors, contacts and torques read afterwards belong to the state after the step: `mj_step` leaves those of
         the state before it, so the forward pass is run once more.
+        """
+        self._hold(target, physics_steps)
+        mujoco.mj_forward(self.model, self.data)
+
+    def step_and_read(self, target: np.ndarray, physics_steps: int, early: int) -> Reading:
+        """Do what `step` does, to the bit, and read the sensors meanwhile.
 
         Args:
-            target: of the joints.
+            target: of the joints [rad], shape (12,).
             physics_steps: for how long.
-            read_early: physics steps between the reading that is returned and the end, less than `physics_steps`. It
-                changes nothing about what happens, to the bit.
+            early: physics steps between the reading that is returned and the end, less than `physics_steps`.
         """
-        self._hold(target, physics_steps - read_early)
-        if not read_early:
-            mujoco.mj_forward(self.model, self.data)
+        if not early:
+            self.step(target, physics_steps)
             return self.read()
+        self._hold(target, physics_steps - early)
         guess = self.data.qacc_warmstart.copy()  # that the solver begins with; the only state that `mj_forward` changes
         mujoco.mj_forward(self.model, self.data)
         reading = self.read()
         self.data.qacc_warmstart[:] = guess
-        self._hold(target, read_early)
-        mujoco.mj_forward(self.model, self.data)
+        self.step(target, early)
         return reading
 
     def settle(self, target: np.ndarray, physics_steps: int) -> None:
