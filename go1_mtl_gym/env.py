@@ -289,10 +289,10 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
 
         Args:
             task: name of the new one.
-            phase: of its gait [cycles], in [0, 1), at once; None lets it begin at phase 0, at once but for two cases:
+            phase: of its gait [cycles], in [0, 1), at once; None lets it begin at phase 0, at once but for three cases:
                 gaits that leave the ground with all feet go on until the middle of their stance
-                (`Gait.change_phase`), and a robot that is faster than half of either task's `command_range` slows
-                down first.
+                (`Gait.change_phase`), a robot that is faster than half of either task's `command_range` slows down
+                first, and a task that was changed to goes on for a second.
 
         Raises:
             InvalidInputError: if the task is unknown here, does not allow the present command, or the phase is none.

@@ -27,6 +27,10 @@ COMMAND_FILTER_S = 0.2
 """Time constant of the low-pass between a command and what expert and student see of it [s]."""
 COMMAND_SLEW = (3.0, 3.0, 6.0)
 """Largest change of the filtered command per second: vx, vy [m/s^2], yaw rate [rad/s^2]."""
+SHORTEST_TASK_S = 1.0
+"""A task that was changed to is asked for at least this long before the next one [s]."""
+SLACK_S = 1e-9
+"""Of times that are sums of control periods [s]."""
 CHANGE_FRACTION = 0.5
 """A gait is changed while the filtered command is within this share of both gaits' `command_range`."""
 REACH, SLACK_COMMAND = 1.15, 0.02
@@ -74,6 +78,7 @@ class Episode:
         steps: control periods since the reset.
         time_s: since the reset [s].
         next_task: what will be asked for as soon as the present gait can be left, or None.
+        task_since_s: since when the present task goes on [s], if it was begun as soon as the one before could be left.
     """
 
     task: Task
@@ -88,6 +93,7 @@ class Episode:
     steps: int = 0
     time_s: float = 0.0
     next_task: Task | None = None
+    task_since_s: float = -np.inf
 
     @property
     def requested_task(self) -> Task:
@@ -118,8 +124,8 @@ class Episode:
         before, mark = self.phase, self.task.gait.change_phase
         self.phase = next_phase(self.task.gait, before, self.filtered_command, seconds)
         leaves = mark is None or before == self.phase or passes(mark, before, self.phase)
-        if self.next_task is not None and leaves and self.is_slow_enough_for(self.next_task):
-            self.change_task(self.next_task, 0.0)
+        if self.next_task is not None and leaves and self._may_change_to(self.next_task, self.time_s + seconds):
+            self._begin(self.next_task, self.time_s + seconds)
         self.filtered_command = filtered(self._followed_command(), self.filtered_command, seconds)
 
     def ahead(self, physics_steps: int, period: int) -> "Episode":
@@ -170,25 +176,30 @@ class Episode:
         """The largest |vx|, |vy| [m/s] and |yaw rate| [rad/s] with which to change to a task, shape (3,)."""
         return CHANGE_FRACTION * np.minimum(self.task.command_range, task.command_range)
 
-    def is_slow_enough_for(self, task: Task) -> bool:
-        """Whether a task may be begun: the filtered command is about within what a change allows.
+    def _may_change_to(self, task: Task, time_s: float) -> bool:
+        """Whether, at a time, the present task has had its own, and the filtered command is about what a change allows.
 
         The filter comes near a command soon, and never to it.
         """
         reach = REACH * self._change_reach(task) + SLACK_COMMAND
-        return bool((np.abs(self.filtered_command) <= reach).all())
+        settled = time_s - self.task_since_s >= SHORTEST_TASK_S - SLACK_S
+        return settled and bool((np.abs(self.filtered_command) <= reach).all())
 
     def change_task(self, task: Task, phase: float | None) -> None:
         """Change the task: at once to a phase, or with None to phase 0 as soon as the present gait can be left.
 
-        With None, a task that is present already goes on as it is, and a robot that is too fast for a change slows down
-        in the present one first.
+        With None, a task that is present already goes on as it is, a robot that is too fast for a change slows down in
+        the present one first, and one that has changed just now finds its feet first.
         """
-        at_once = task != self.task and self.task.gait.change_phase is None and self.is_slow_enough_for(task)
-        if phase is not None or at_once:
-            self.task, self.phase, self.next_task = task, phase or 0.0, None
+        if phase is not None:
+            self.task, self.phase, self.next_task, self.task_since_s = task, phase, None, -np.inf
+        elif task != self.task and self.task.gait.change_phase is None and self._may_change_to(task, self.time_s):
+            self._begin(task, self.time_s)
         else:
             self.next_task = None if task == self.task else task
+
+    def _begin(self, task: Task, time_s: float) -> None:
+        self.task, self.phase, self.next_task, self.task_since_s = task, 0.0, None, time_s
 
     # -- Its reports ---------------------------------------------------------------------------------------------------
 

@@ -248,3 +248,12 @@ def test_while_a_gait_waits_the_present_one_does_not_speed_up():
     episode.change_command(np.array([TASKS["bound"].command_range[0], 0.0, 0.0]))
     reached = until_it_changes(episode)[:, 0]
     assert len(reached) > 3 and reached[:-1].max() <= half_reach("jump", "bound")[0]
+
+
+def test_a_gait_that_was_changed_to_goes_on_for_a_second():
+    episode = running("trot", (0.0, 0.0, 0.0), (0.1, 0.0, 0.0))
+    episode.change_task(TASKS["walk"], None)
+    assert episode.task.name == "walk"
+    for name in ("trot", "pace"):  # the last button counts
+        episode.change_task(TASKS[name], None)
+    assert len(until_it_changes(episode)) - 1 == 50 and episode.task.name == "pace"

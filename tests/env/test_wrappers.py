@@ -25,7 +25,7 @@ def home(env: PerturbationWrapper) -> np.ndarray:
 
 
 def no_physics(env: PerturbationWrapper) -> Callable[[np.ndarray, int, int], Reading]:
-    """In the place of `Simulation.step`: time passes and nothing moves."""
+    """In the place of `Simulation.step_and_read`: time passes and nothing moves."""
     return lambda target, steps, early: env.unwrapped.simulation.read()
 
 
@@ -56,13 +56,13 @@ def test_noise_is_autoregressive_with_a_sigma_drawn_per_episode():
     sigmas, lags = [], []
     for _ in range(60):
         env.reset()
-        env.unwrapped.simulation.step = no_physics(env)  # the noise does not depend on the physics
+        env.unwrapped.simulation.step_and_read = no_physics(env)  # the noise does not depend on the physics
         noise = np.array([env.step(home(env))[4]["executed_action"] for _ in range(150)]) - home(env)
         noise *= env.unwrapped.action_map.half_range
         sigmas.append(noise.std())
         lags.append(np.mean(noise[1:] * noise[:-1]) / np.mean(noise**2))
         assert np.ptp(noise.std(axis=0)) < 1.2 * noise.std(), "the same in radians for every joint"
-        del env.unwrapped.simulation.step
+        del env.unwrapped.simulation.step_and_read
     assert max(sigmas) < 0.06 * 1.15 and min(sigmas) < 0.01
     assert np.mean(sigmas) == pytest.approx(0.03, abs=0.008)  # uniform in (0, .06)
     assert np.mean(lags) == pytest.approx(np.exp(-0.02 / NOISE_CORRELATION_S), abs=0.03)
@@ -72,7 +72,7 @@ def pushes(env: PerturbationWrapper, steps: int, monkeypatch) -> np.ndarray:
     """Every velocity passed to `push` in a run, shape (n, 3)."""
     pushes: list[np.ndarray] = []
     monkeypatch.setattr(env.unwrapped, "push", lambda delta: pushes.append(np.array(delta)))
-    monkeypatch.setattr(env.unwrapped.simulation, "step", no_physics(env))
+    monkeypatch.setattr(env.unwrapped.simulation, "step_and_read", no_physics(env))
     for _ in range(steps):
         env.step(home(env))
     return np.array(pushes)
@@ -131,7 +131,7 @@ def multi_gait(**kwargs) -> PerturbationWrapper:
 
 def commands(env: PerturbationWrapper, steps: int, monkeypatch) -> np.ndarray:
     """Every redrawn command of a run without physics, shape (n, 3)."""
-    monkeypatch.setattr(env.unwrapped.simulation, "step", no_physics(env))
+    monkeypatch.setattr(env.unwrapped.simulation, "step_and_read", no_physics(env))
     seen = [env.reset(seed=0)[1]["command"]]
     for _ in range(steps):
         command = env.step(home(env))[4]["command"]
@@ -156,7 +156,7 @@ def test_every_command_can_be_a_corner(monkeypatch):
 
 def changes(env: PerturbationWrapper, steps: int, monkeypatch, seed: int = 0) -> list[tuple[int, str]]:
     """What tasks are asked for in a run without physics, and in which steps."""
-    monkeypatch.setattr(env.unwrapped.simulation, "step", no_physics(env))
+    monkeypatch.setattr(env.unwrapped.simulation, "step_and_read", no_physics(env))
     env.reset(seed=seed)
     set_task, step, asked = env.unwrapped.set_task, 0, []
     monkeypatch.setattr(env.unwrapped, "set_task", lambda name: (asked.append((step, name)), set_task(name)))
@@ -182,7 +182,7 @@ def test_one_seed_changes_the_same_tasks_and_another_others(monkeypatch):
 
 def test_a_command_beyond_the_new_tasks_range_goes_to_its_border(monkeypatch):
     env = multi_gait(task_interval=(0.1, 0.1))
-    monkeypatch.setattr(env.unwrapped.simulation, "step", no_physics(env))
+    monkeypatch.setattr(env.unwrapped.simulation, "step_and_read", no_physics(env))
     env.reset(seed=0, options={"command": (1.9, -1.0, 0.4)})  # walk accepts 1.1, -0.9
     for _ in range(5):
         *_, info = env.step(home(env))
@@ -197,7 +197,7 @@ def test_commands_come_from_the_range_of_the_task_asked_for(monkeypatch, passing
         Go1Env("jump", tasks=("jump", "creep", "trot")),
         **(QUIET | {"task_interval": (0.06, 0.3), "command_interval": (0.04, 0.1)}),
     )
-    monkeypatch.setattr(env.unwrapped.simulation, "step", no_physics(env))
+    monkeypatch.setattr(env.unwrapped.simulation, "step_and_read", no_physics(env))
     env.reset(seed=0)
     waited, largest = False, 0.0
     for _ in range(600):
