@@ -1,5 +1,7 @@
 """The robot in a mirror."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -86,6 +88,16 @@ def test_what_has_no_image_is_refused():
     rows = trainers.collect("trot", seconds=0.2, env_kwargs={"history": 2})
     with pytest.raises(InvalidInputError, match="one frame"):
         mirrored(rows)
+    known = trainers.collect("trot", seconds=0.2, env_kwargs={"tasks": ("trot",)})
+    unknown = dataclasses.replace(known, contract=dataclasses.replace(known.contract, gaits=(None,)))
+    with pytest.raises(InvalidInputError, match="gaits the contract names were expected, got some of 'trot'"):
+        mirrored(unknown)
+
+
+def test_only_the_gaits_of_the_rows_need_be_known():
+    rows = trainers.collect("pace", seconds=0.4, env_kwargs={"tasks": ("pace",)})
+    among_others = rows.with_tasks(("hop", "pace"))
+    np.testing.assert_array_equal(mirrored(among_others).obs[:, :-2], mirrored(rows).obs[:, :-1])
 
 
 def test_cloning_learns_from_images_too(rows):
