@@ -42,16 +42,15 @@ def mirrored(rows: Demonstrations) -> Demonstrations:
     phase 0 in the mirror too.
 
     Args:
-        rows: with tasks whose gaits the contract names.
+        rows: of tasks whose gaits the contract names.
 
     Returns:
         Rows of those tasks whose gait is the same in the mirror, in order.
 
     Raises:
-        InvalidInputError: if a task's gait is not known.
+        InvalidInputError: if the gait of a row is not known.
     """
-    contract = rows.contract
-    shifts = np.array([np.nan if (shift := mirror_shift(gait)) is None else shift for gait in _gaits(contract)])
+    contract, shifts = rows.contract, _shifts(rows)
     rows = rows.take(np.isfinite(shifts[rows.task]))
     return dataclasses.replace(
         rows, obs=_mirrored_obs(rows.obs, contract, shifts[rows.task]), acts=_mirrored_joints(rows.acts)
@@ -67,15 +66,20 @@ def with_mirrored(rows: Demonstrations, weights: np.ndarray | None = None) -> tu
     """
     weights = np.ones(len(rows), dtype=np.int64) if weights is None else np.asarray(weights)
     image = mirrored(rows)
-    has_image = np.array([mirror_shift(gait) is not None for gait in _gaits(rows.contract)])[rows.task]
+    has_image = np.isfinite(_shifts(rows))[rows.task]
     return Demonstrations.concatenate([rows, image]), np.concatenate([weights, weights[has_image]])
 
 
-def _gaits(contract: PolicyContract) -> list[Gait]:
-    gaits = [gait for gait in contract.gaits if gait is not None]
-    if len(gaits) < contract.n_tasks:
-        raise InvalidInputError(f"a contract that names the gaits of all its tasks was expected, got {contract.gaits}")
-    return gaits
+def _shifts(rows: Demonstrations) -> np.ndarray:
+    """`mirror_shift` of every task [cycles], shape (K,); NaN where there is none, and where no row asks for it."""
+    shifts = np.full(len(rows.tasks), np.nan)
+    for k in np.unique(rows.task).tolist():
+        gait = rows.contract.gaits[k]
+        if gait is None:
+            raise InvalidInputError(f"rows whose gaits the contract names were expected, got some of {rows.tasks[k]!r}")
+        shift = mirror_shift(gait)
+        shifts[k] = np.nan if shift is None else shift
+    return shifts
 
 
 def _mirrored_obs(obs: np.ndarray, contract: PolicyContract, shift: np.ndarray) -> np.ndarray:

@@ -18,6 +18,8 @@ HARD_PUSHES_S = 5.0
 """Mean time between pushes at the edge of what the expert bears [s]."""
 WORLD_CLAIM = 0.95
 """Success rate that is claimed of a world that is not the nominal one."""
+DRAWN_CLAIM = 0.90
+"""The same where everything is drawn at once from the ranges of `DomainRandomization`."""
 TOUR_CLAIM = 0.9704
 """What 100 tours without a fall show at 95 %: the 100th root of 5 %, rounded down."""
 
@@ -83,6 +85,7 @@ def world(name: str, title: str, **env_kwargs: Any) -> Condition:
 
 _TWICE = {"noise": SensorNoise().scaled(2.0), "estimator_noise": EstimatorNoise().scaled(2.0)}
 """Each is noticed by one of policy and expert."""
+_ALL_DRAWN = {"randomization": True}
 _PUSHING = OperatorConfig(hard_push_interval=HARD_PUSHES_S).of_one_gait()
 CONDITIONS = {
     each.name: each
@@ -94,6 +97,12 @@ CONDITIONS = {
         world("friction", "friction 0.4", friction=0.4),
         world("joint_friction", "joint friction 1 N m", joint_friction=1.0),
         world("noise", "twice the noise", **_TWICE),
+        world("joint_damping", "joint damping 1 N m s/rad", joint_damping=1.0),
+        world("soft_feet", "soft feet (0.16 s)", contact_time_s=0.16),
+        world("encoders", "encoders off by up to 0.06 rad", sensors={"encoder_offset": 0.06}),
+        world("late_sensors", "readings 20 ms late", sensors={"delay_s": 0.02}),
+        world("settled", "half a second of standing before the clock", settle_s=0.5),
+        Condition("all_drawn", "all of these drawn at once", env_kwargs=_ALL_DRAWN, claim=DRAWN_CLAIM),
         Condition("hard_pushes", "hard pushes", _PUSHING, claim=WORLD_CLAIM),
         Condition("tour", "tours of all gaits", OperatorConfig(), claim=TOUR_CLAIM, judged_by="survival"),
     )
