@@ -7,6 +7,7 @@ import argparse
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from experiments import main_job
 from experiments.catalog import STUDIES, resolve, study_class
@@ -14,6 +15,7 @@ from experiments.plots import save_figure
 from experiments.results import Results, read_json, without_folders
 from experiments.tables import markdown
 from go1_mtl_gym.errors import InvalidInputError
+from trainers import Certificate
 from trainers.utils.files import write_atomically
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -24,7 +26,10 @@ COPIED = ("joint_targets.png", "gaits.gif")
 """Files of a run that are published as they are."""
 POLICIES = {"policy.zip": "clocked.zip", "phase_free.zip": "phase_free.zip"}
 """Policies of a run, and their names in ``trainers/assets/``, from where `trainers.load_pretrained` reads them."""
-PUBLISHED_PRESET = "default"
+PUBLISHED_PRESET, SHIPPED_PRESET = "default", "shipped"
+"""Of the run whose metrics are published, and of the one whose policies come with the package."""
+CERTIFICATES = "certificate_*.json"
+"""What `trainers.certify` found out about the policies that come with the package."""
 
 
 @dataclass(frozen=True)
@@ -138,6 +143,9 @@ def texts(root: Path) -> dict[Path, str]:
     if not readme.is_file():
         raise InvalidInputError(f"there is no {readme}")
     files = {folder / f"{name}.md": text for name in PAGES if (text := page(name, folder)) is not None}
+    for path in folder.glob(CERTIFICATES):
+        certificate = Certificate.from_dict(read_json(path))
+        files[path.with_suffix(".md")] = certificate.markdown()
     path = folder / f"{main_job.NAME}.json"
     if path.is_file():
         results = Results.read(path)
@@ -152,32 +160,43 @@ def texts(root: Path) -> dict[Path, str]:
 def copy_run(run: Path, root: Path) -> None:
     """Copy what is published of a run; the output folder, which only its machine knows, is cut from the command.
 
+    Of a run of the preset "default" these are the metrics and pictures, of one of "shipped" the policies.
+
     Args:
         run: output folder of the main job.
         root: of the checkout; results go to ``docs/results``, policies to ``trainers/assets``.
 
     Raises:
-        InvalidInputError: if files are missing (all are named), the metrics cannot be read, or the run is not one of
-            the preset that is published.
+        InvalidInputError: if files are missing (all are named), the metrics cannot be read, or the run is of neither
+            preset.
     """
-    folder, assets = root / "docs" / "results", root / "trainers" / "assets"
-    missing = [name for name in ("metrics.json", *COPIED, *POLICIES) if not (run / name).is_file()]
+    metrics = read_json(run / "metrics.json") if (run / "metrics.json").is_file() else {}
+    preset = metrics.get("config", {}).get("preset")
+    wanted = {PUBLISHED_PRESET: COPIED, SHIPPED_PRESET: tuple(POLICIES)}.get(preset, (*COPIED, *POLICIES))
+    missing = [name for name in ("metrics.json", *wanted) if not (run / name).is_file()]
     if missing:
         raise InvalidInputError(
             f"{run} lacks {', '.join(missing)}; expected the --out folder of a finished main job"
             + (" (gaits.gif needs OpenGL)" if "gaits.gif" in missing else "")
         )
-    metrics = read_json(run / "metrics.json")
-    preset = metrics.get("config", {}).get("preset")
-    if preset != PUBLISHED_PRESET:
-        raise InvalidInputError(f"a run of the preset {PUBLISHED_PRESET!r} was expected, {run} is one of {preset!r}")
+    if preset == PUBLISHED_PRESET:
+        _copy_results(run, metrics, root / "docs" / "results")
+    elif preset == SHIPPED_PRESET:
+        assets = root / "trainers" / "assets"
+        assets.mkdir(parents=True, exist_ok=True)
+        for name, published in POLICIES.items():
+            shutil.copyfile(run / name, assets / published)
+    else:
+        raise InvalidInputError(
+            f"a run of the preset {PUBLISHED_PRESET!r} or {SHIPPED_PRESET!r} was expected, {run} is one of {preset!r}"
+        )
+
+
+def _copy_results(run: Path, metrics: dict[str, Any], folder: Path) -> None:
     results = main_job.results_of(metrics, without_folders(metrics.get("command", "")))
     results.write(folder / f"{main_job.NAME}.json")
     for name in COPIED:
         shutil.copyfile(run / name, folder / name)
-    assets.mkdir(parents=True, exist_ok=True)
-    for name, published in POLICIES.items():
-        shutil.copyfile(run / name, assets / published)
 
 
 def publish_command(arguments: list[str], root: Path = ROOT) -> None:
