@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+import trainers
 from experiments import publish
 from experiments.__main__ import main
 from experiments.catalog import STUDIES, study_class
@@ -61,7 +62,7 @@ def test_a_run_becomes_records_a_page_and_the_summary(run, root):
     readme = (root / "README.md").read_text()
     assert readme.startswith("# A title\n") and readme.endswith("The end.\n") and "old" not in readme
     assert "| trot | 20/20 | 18/20 | 0.030 | 0.030 | 2.50 | 2.50 | 2.50 |" in readme
-    assert (root / "trainers" / "assets" / "clocked.zip").read_bytes() == b"policy.zip"
+    assert not (root / "trainers" / "assets").exists(), "policies come from the preset for them"
     before = {path: path.stat().st_mtime_ns for path in root.rglob("*") if path.is_file()}
     publish_command([], root)
     publish_command(["--check"], root)
@@ -71,7 +72,24 @@ def test_a_run_becomes_records_a_page_and_the_summary(run, root):
         publish_command(["--check"], root)
 
 
-@pytest.mark.parametrize("name", ["metrics.json", "gaits.gif", "policy.zip"])
+def test_a_run_for_the_package_becomes_its_policies(run, root):
+    (run / "metrics.json").write_text(json.dumps(metrics(config={"preset": "shipped"})))
+    publish_command([str(run)], root)
+    assert (root / "trainers" / "assets" / "clocked.zip").read_bytes() == b"policy.zip"
+    assert (root / "trainers" / "assets" / "phase_free.zip").read_bytes() == b"phase_free.zip"
+    assert not (root / "docs" / "results" / "main_job.json").exists()
+
+
+def test_certificates_get_their_page(root):
+    folder = root / "docs" / "results"
+    folder.mkdir(parents=True)
+    certificate = trainers.certify("expert", tasks=("trot",), conditions=("drawn",), episodes=1, seconds=3.0)
+    (folder / "certificate_expert.json").write_text(json.dumps(certificate.as_dict()))
+    publish_command([], root)
+    assert (folder / "certificate_expert.md").read_text() == certificate.markdown()
+
+
+@pytest.mark.parametrize("name", ["metrics.json", "gaits.gif", "joint_targets.png"])
 def test_a_missing_file_is_named_before_anything_is_copied(run, root, name):
     (run / name).unlink()
     with pytest.raises(InvalidInputError, match=name):
@@ -102,7 +120,9 @@ def test_no_path_of_the_machine_is_published(tmp_path):
 
 def test_published_results_have_their_studies_and_their_pictures():
     published = [name for name in STUDIES if (FOLDER / f"{name}.json").is_file()]
-    assert {path.stem for path in FOLDER.glob("*.json")} == {*published, "main_job"} and len(published) > 20
+    certificates = {path.stem for path in FOLDER.glob(publish.CERTIFICATES)}
+    assert {path.stem for path in FOLDER.glob("*.json")} == {*published, *certificates, "main_job"}
+    assert len(published) > 20
     for name in published:
         cls, path = study_class(name), FOLDER / f"{name}.json"
         assert cls.name == name and Results.read(path).study == name
@@ -152,7 +172,7 @@ def test_a_quick_run_writes_results_and_picture_and_goes_on(tmp_path, capsys):
         "| expert | trot |" in capsys.readouterr().out and (tmp_path / "student_transitions.png").stat().st_size > 5000
     )
     results = Results.read(tmp_path / "student_transitions.json")
-    assert len(results.records) == 6 and results.command.endswith("--quick --n-jobs 1 --only 'to walk'")
+    assert len(results.records) == 10 and results.command.endswith("--quick --n-jobs 1 --only 'to walk'")
     cells = {path: path.stat().st_mtime_ns for path in (tmp_path / "cache").rglob("*.json")}
     assert len(cells) == 6 and main([*arguments, *folders]) == 0
     assert (tmp_path / "student_transitions.json").read_text() == first
