@@ -71,7 +71,7 @@ def test_a_lab_that_was_used_before_gives_the_same_walk():
 
 @pytest.mark.parametrize(
     ("falls_from", "tracks_to", "survived", "tracked", "at_cap"),
-    [(1.65, 1.25, 1.6, 1.2, False), (9.0, 9.0, 2.5, 2.5, True), (0.55, 0.35, 0.4, 0.2, False), (0.0, 0.0, 0, 0, False)],
+    [(1.65, 1.25, 1.5, 1.1, False), (9.0, 9.0, 2.5, 2.5, True), (0.55, 0.35, 0.5, 0.3, False), (0.0, 0.0, 0, 0, False)],
 )
 def test_the_largest_command_is_found(monkeypatch, falls_from, tracks_to, survived, tracked, at_cap):
     def episodes(lab, task, axis, level, trials, seconds, seed):
