@@ -54,11 +54,11 @@ def summary_table(results: Results) -> str:
     rows = []
     for task in distinct(results.records, "task"):
         both = [results.of(task=task, agent=agent) for agent in (EXPERT, STUDENT)]
-        cells = [count(members.rate()) for members in both]
+        cells = [count(members.rate(key)) for key in ("succeeded", "operator_succeeded") for members in both]
         for key, how in (("velocity_error", ".3f"), ("step_rate", ".2f")):
             cells += [number(members.mean(key), how) for members in both]
         rows.append([task, *cells, f"{TASKS[task].gait.step_rate:.2f}"])
-    metrics = ("success", "velocity error [m/s]", "steps per second")
+    metrics = ("success", "in hands", "velocity error [m/s]", "steps per second")
     header = [f"{metric}: {agent}" for metric in metrics for agent in ("expert", "student")]
     return markdown(["gait", *header, "steps per second: planned"], rows)
 
