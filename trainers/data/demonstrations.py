@@ -197,7 +197,7 @@ class Demonstrations:
 
     @staticmethod
     def concatenate(parts: Sequence["Demonstrations"]) -> "Demonstrations":
-        """All rows of several sets; `contract` names every gait that one of theirs does, `meta` keeps what is agreed on.
+        """All rows of several sets; `contract` names every gait that any of theirs does, `meta` what they agree on.
 
         Raises:
             InvalidInputError: if there are none, or their contracts differ.
