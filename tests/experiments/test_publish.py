@@ -152,7 +152,7 @@ def test_a_quick_run_writes_results_and_picture_and_goes_on(tmp_path, capsys):
         "| expert | trot |" in capsys.readouterr().out and (tmp_path / "student_transitions.png").stat().st_size > 5000
     )
     results = Results.read(tmp_path / "student_transitions.json")
-    assert len(results.records) == 6 and results.command.endswith("--quick --n-jobs 1 --only 'to walk'")
+    assert len(results.records) == 10 and results.command.endswith("--quick --n-jobs 1 --only 'to walk'")
     cells = {path: path.stat().st_mtime_ns for path in (tmp_path / "cache").rglob("*.json")}
     assert len(cells) == 6 and main([*arguments, *folders]) == 0
     assert (tmp_path / "student_transitions.json").read_text() == first
