@@ -154,7 +154,7 @@ def test_a_quick_run_writes_results_and_picture_and_goes_on(tmp_path, capsys):
     results = Results.read(tmp_path / "student_transitions.json")
     assert len(results.records) == 10 and results.command.endswith("--quick --n-jobs 1 --only 'to walk'")
     cells = {path: path.stat().st_mtime_ns for path in (tmp_path / "cache").rglob("*.json")}
-    assert len(cells) == 6 and main([*arguments, *folders]) == 0
+    assert len(cells) == 10 and main([*arguments, *folders]) == 0
     assert (tmp_path / "student_transitions.json").read_text() == first
     assert cells == {path: path.stat().st_mtime_ns for path in cells}
 
