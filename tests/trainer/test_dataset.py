@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from go1_mtl_gym import PolicyContract
+from go1_mtl_gym import GAITS, PolicyContract
 from go1_mtl_gym.contract import ObservationTerm, terms_of
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.sensing.observation import ObservationLayout
@@ -99,6 +99,14 @@ def test_rows_are_brought_into_the_order_of_a_policys_tasks():
         tiny().fitted_to(CONTRACT.with_tasks(("walk", "bound")))
     rows = tiny()
     assert rows.fitted_to(CONTRACT) is rows and rows.fitted_to(None) is rows
+
+
+def test_rows_learn_the_gaits_that_the_other_side_names():
+    named = CONTRACT.with_tasks(("walk", "bound", "trot"), GAITS)
+    assert tiny().fitted_to(named).contract == named
+    own = [tiny(contract=CONTRACT.with_tasks(CONTRACT.tasks, {name: GAITS[name]})) for name in CONTRACT.tasks]
+    assert own[0].contract.gaits == (GAITS["trot"], None)
+    assert Demonstrations.concatenate(own).contract.gaits == (GAITS["trot"], GAITS["bound"])
 
 
 @pytest.mark.parametrize("change", [{"control_hz": 4.0}, {"kp": 40.0}, {"joints": ("knee", "hip")}])

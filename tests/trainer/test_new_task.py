@@ -195,6 +195,16 @@ def test_the_new_head_learns_from_the_mirror_too(trained, pace):
     assert errors[1] < 0.8 * errors[0]
 
 
+def test_old_gaits_are_rehearsed_in_the_mirror_too(trained, pace, demos):
+    losses = []
+    for mirror in (False, True):
+        grown = trained.add_task("pace")
+        history = learn_task(grown, pace, dataclasses.replace(QUICK, mirror=mirror), rehearsal=demos)
+        assert set(history.mse) == set(TASKS)
+        losses.append(history.loss[-1])
+    assert losses[0] != losses[1]
+
+
 def test_with_rehearsal_all_learn_and_old_tasks_are_kept(trained, pace, demos):
     grown = trained.add_task("pace")
     before = weights(grown)

@@ -131,7 +131,7 @@ class Demonstrations:
         return dataclasses.replace(self, obs=self.obs[:, have.columns(want)], contract=contract)
 
     def fitted_to(self, contract: PolicyContract | None, name: str = "the policy") -> "Demonstrations":
-        """These rows for whoever has a contract: with its order of tasks, all else being equal.
+        """These rows for whoever has a contract: with its order of tasks and the gaits it names, all else being equal.
 
         Args:
             contract: of the other side; None where it has none, which is taken to have the rows' own.
@@ -143,7 +143,8 @@ class Demonstrations:
         if contract is None or contract == self.contract:
             return self
         contract.check(self.contract, name, "the demonstrations", ignore=("tasks",))
-        return self if contract.tasks == self.tasks else self.with_tasks(contract.tasks)
+        fitted = self if contract.tasks == self.tasks else self.with_tasks(contract.tasks)
+        return dataclasses.replace(fitted, contract=_with_gaits_of(fitted.contract, [contract]))
 
     def with_tasks(self, tasks: Sequence[str]) -> "Demonstrations":
         """The same rows with the one-hot task id of other tasks.
@@ -196,7 +197,7 @@ class Demonstrations:
 
     @staticmethod
     def concatenate(parts: Sequence["Demonstrations"]) -> "Demonstrations":
-        """All rows of several sets; `meta` keeps what they agree on.
+        """All rows of several sets; `contract` names every gait that any of theirs does, `meta` what they agree on.
 
         Raises:
             InvalidInputError: if there are none, or their contracts differ.
@@ -210,7 +211,8 @@ class Demonstrations:
         arrays: dict[str, Any] = {
             name: np.concatenate([getattr(p, name) for p in parts]) for name in ("obs", "acts", "starts")
         }
-        return dataclasses.replace(first, **arrays, meta=agreed)
+        contract = _with_gaits_of(first.contract, [part.contract for part in parts])
+        return dataclasses.replace(first, **arrays, contract=contract, meta=agreed)
 
     def to_trajectories(self) -> "list[Trajectory]":
         """Episodes as `imitation` trajectories.
@@ -259,3 +261,9 @@ class Demonstrations:
         if len(shard) != manifest["rows"]:
             raise InvalidInputError(f"{path} is damaged: {len(shard)} rows, its manifest says {manifest['rows']}")
         return shard
+
+
+def _with_gaits_of(contract: PolicyContract, others: Sequence[PolicyContract]) -> PolicyContract:
+    """A contract, with the gaits that others name for its tasks; they have been checked to agree."""
+    named = {name: gait for other in others for name, gait in zip(other.tasks, other.gaits) if gait is not None}
+    return contract.with_tasks(contract.tasks, named)
