@@ -15,7 +15,6 @@ from experts.robot_model import RobotModel
 from go1_mtl_gym import GAITS, robot
 from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.sensing.state import RobotState
-from go1_mtl_gym.tasks import TASKS
 
 MIDDLE = (0.4, 0.1, 0.2)
 FAST = (0.5, 0.2, 0.5)
