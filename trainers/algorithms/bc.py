@@ -15,7 +15,7 @@ from trainers.algorithms import losses
 from trainers.algorithms.optimizer import PRECISIONS, WeightAverage, adamw_one_cycle, matmul_precision
 from trainers.data.batches import TensorBatches, check_batch_size
 from trainers.data.demonstrations import Demonstrations
-from trainers.data.mirror import mirrored, with_mirrored
+from trainers.data.mirror import with_mirrored
 from trainers.evaluation.metrics import offline_metrics
 from trainers.policies.multi_head import MultiHeadPolicy
 from trainers.utils.logging import make_logger
@@ -281,7 +281,8 @@ def train_bc(
     dataset = dataset.fitted_to(policy.contract)
     validation = None if validation is None else validation.fitted_to(policy.contract)
     check_batch_size(min(config.batch_size, len(dataset)), dataset)
+    if config.mirror:  # once, for normalization and training alike
+        dataset, config = with_mirrored(dataset)[0], dataclasses.replace(config, mirror=False)
     if fit_normalization:
-        seen = Demonstrations.concatenate([dataset, mirrored(dataset)]) if config.mirror else dataset
-        policy.fit_normalization(seen.obs, seen.acts)
+        policy.fit_normalization(dataset.obs, dataset.acts)
     return BCTrainer(policy, config, logger).fit(dataset, validation, progress, on_batch_end)

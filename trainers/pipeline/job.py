@@ -249,15 +249,15 @@ class Job:
 
     def _measured(self, policy: Any, task: str, episodes: int, protocol: str) -> dict[str, Any]:
         config = self.config
-        operated = protocol == OPERATOR and config.operator is not None
+        operator = config.operator.of_one_gait() if protocol == OPERATOR and config.operator else None
         result = evaluate(
             policy,
             task,
             episodes=episodes,
             seconds=config.episode_s,
             seed=config.seed + 1,
-            command_interval=None if operated else config.command_interval,
-            operator=config.operator.of_one_gait() if operated and config.operator else None,
+            command_interval=None if operator else config.command_interval,
+            operator=operator,
             n_jobs=config.n_envs,
             progress=self.progress,
             **(config.env_kwargs if policy == "expert" else {}),
