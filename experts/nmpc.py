@@ -232,26 +232,31 @@ class NMPCExpert:
             states, inputs = horizon.reference, horizon.nominal
         else:
             states, inputs = earlier.shifted(state.time_s, horizon.frame, horizon.reference, horizon.nominal)
-        states, inputs = self._solve_sequence(horizon, states, inputs)
-        return Trajectory(state.time_s, state.gait, horizon.dt, states, inputs, horizon.frame)
+        states, inputs, contact = self._solve_sequence(horizon, states, inputs)
+        return Trajectory(state.time_s, state.gait, horizon.dt, states, inputs, contact, horizon.frame)
 
     def _solve_sequence(
         self, horizon: Horizon, states: np.ndarray, inputs: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Sequential quadratic programming from a trajectory, shapes (N + 1, 12) and (N, 12), to the next one."""
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Sequential quadratic programming from a trajectory, shapes (N + 1, 12) and (N, 12), to the next one.
+
+        Returns:
+            That, and over which fractions of the intervals its forces are means; of the nominal ones, which are those
+            of an instant, over all.
+        """
         config = self.config
         for _ in range(config.sqp_iterations):
             model = linearize(states, inputs, horizon.feet, horizon.inertia_b, horizon.dt, horizon.mass)
             solution = self._mpc.solve(model, horizon.x0, horizon.reference[1:], horizon.nominal, horizon.contact)
             self.counters.count(solution)
             if not solution.usable:
-                return horizon.reference, horizon.nominal
+                return horizon.reference, horizon.nominal, np.ones_like(horizon.contact)
             before, states, inputs = states, np.vstack([horizon.x0, solution.states]), solution.inputs
             # Attitude and lever arms are what the Jacobians depend on most: have they moved, these no longer hold.
             moved = np.abs(states - before)
             if max(moved[:, RPY].max(), moved[:, COM].max() / config.com_height) < config.sqp_tolerance:
                 break
-        return states, inputs
+        return states, inputs, horizon.contact
 
     def motion(self, state: RobotState) -> NominalMotion:
         """The nominal motion of the state's gait, or of standing."""

@@ -190,7 +190,9 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
     def _observe(self, episode: Episode, state: RobotState, reading: Reading) -> np.ndarray:
         """The observation that a reset or step has led to, once the episode has taken it in."""
         arriving = episode.sensor_faults.observe(reading)
-        parts = measure(arriving, state, episode.last_action, episode.sensor_noise, self.np_random)
+        parts = measure(
+            arriving, state, episode.last_action, episode.sensor_noise, self.np_random, self.layout.channels
+        )
         episode.remember(frame(parts))
         observation = self.layout.flatten(parts, episode.older_frames, self.tasks.index(episode.task.name))
         if self._simulation.stable:

@@ -1,6 +1,6 @@
 """What there is to see at one instant: the true state, and what the sensors say. Pure: nothing here remembers."""
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 
 import numpy as np
 
@@ -44,8 +44,9 @@ def measure(
     last_action: np.ndarray,
     noise: SensorNoise | None,
     rng: np.random.Generator,
+    channels: Container[str],
 ) -> dict[str, np.ndarray]:
-    """Every part of an observation by name, now, whether a layout has it or not; finite even if the physics diverged.
+    """Every part of an observation by name, now; finite even if the physics diverged.
 
     Args:
         reading: that arrives from the sensors now.
@@ -53,6 +54,8 @@ def measure(
         last_action: the action applied during the last step, shape (12,).
         noise: of the sensors, or None.
         rng: that the noise is drawn from.
+        channels: that are shown; what costs time and is not among them is left out. Noise is drawn for all others, so
+            that it is the same whichever are shown.
     """
     turn = 2 * np.pi * state.phase
     parts = {
@@ -68,7 +71,8 @@ def measure(
     }
     if noise is not None:
         noise.apply(parts, rng)
-    parts["leg_kinematics"] = leg_kinematics(parts["q"], parts["dq"], parts["gyroscope"])
+    if "leg_kinematics" in channels:
+        parts["leg_kinematics"] = leg_kinematics(parts["q"], parts["dq"], parts["gyroscope"])
     if np.isfinite(sum(float(part.sum()) for part in parts.values())):
         return parts
     return {name: np.nan_to_num(part) for name, part in parts.items()}

@@ -9,6 +9,9 @@ from experts.mpc.srbd import FORCE_UNIT
 from go1_mtl_gym.gaits import Gait
 from go1_mtl_gym.sensing.state import RobotState
 
+LEAST_CONTACT = 0.25
+"""A force is raised at most to that of a foot that stands during this fraction of an interval."""
+
 
 @dataclass(frozen=True)
 class Trajectory:
@@ -20,6 +23,8 @@ class Trajectory:
         dt: interval [s].
         states: x at the N + 1 ends of the intervals, shape (N + 1, 12).
         inputs: u during the intervals, in units of `FORCE_UNIT`, shape (N, 12).
+        contact: fraction of its interval over which each force is the mean, and on the rest of which its foot is in the
+            air, shape (N, 4).
         frame: that states and inputs are in.
     """
 
@@ -28,6 +33,7 @@ class Trajectory:
     dt: float
     states: np.ndarray
     inputs: np.ndarray
+    contact: np.ndarray
     frame: Frame = WORLD
 
     def shifted(
@@ -55,9 +61,13 @@ class Trajectory:
         return states, np.where((middle < steps)[:, None], forces, nominal)
 
     def forces_w(self, time_s: float) -> np.ndarray:
-        """Ground forces planned for a time within the horizon, world [N], shape (4, 3)."""
+        """Ground forces planned for a time within the horizon, world [N], shape (4, 3).
+
+        Planned are means over whole intervals; a foot that stands during a part of one has to push harder then.
+        """
         k = int((time_s - self.time_s) / self.dt + 1e-9)  # rounding must not throw the beginning back by one
-        forces = self.inputs[min(max(k, 0), len(self.inputs) - 1)].reshape(4, 3) * FORCE_UNIT
+        k = min(max(k, 0), len(self.inputs) - 1)
+        forces = self.inputs[k].reshape(4, 3) * FORCE_UNIT / np.maximum(self.contact[k], LEAST_CONTACT)[:, None]
         return forces @ self.frame.rotation.T
 
 

@@ -185,6 +185,7 @@ def test_trots_at_other_rates(control_hz):
     [
         ("pace", {"action_delay_s": 0.02}),
         ("bound", {"payload_kg": 3.0}),
+        ("bound", {"action_delay_s": 0.015}),
         ("walk", {"joint_friction": 1.0, "joint_damping": 1.0, "contact_time_s": 0.1, "action_delay_s": 0.012}),
         ("trot", {"payload_kg": 2.0, "motor_strength": 0.9, "action_delay_s": 0.033}),
     ],

@@ -11,14 +11,14 @@ from experts.mpc.warm_start import Recall, Trajectory
 from go1_mtl_gym import GAITS
 
 TROT, DT = GAITS["trot"], 0.025
+THROUGHOUT = np.ones((4, 4))
 REFERENCE, NOMINAL = np.full((5, 12), -1.0), np.full((4, 12), -2.0)
 
 
 def ramp(time_s: float = 1.0, gait=TROT) -> Trajectory:
     """Every state is its time since 1.0 in intervals, every input the number of its interval."""
-    return Trajectory(
-        time_s, gait, DT, np.tile(np.arange(5.0)[:, None], (1, 12)), np.tile(np.arange(4.0)[:, None], (1, 12))
-    )
+    states, inputs = (np.tile(np.arange(float(count))[:, None], (1, 12)) for count in (5, 4))
+    return Trajectory(time_s, gait, DT, states, inputs, THROUGHOUT)
 
 
 @pytest.mark.parametrize(
@@ -47,6 +47,13 @@ def test_shifting_leaves_the_trajectory_and_the_reference_alone():
 @pytest.mark.parametrize(("seconds", "k"), [(0.0, 0), (0.024, 0), (0.025, 1), (0.06, 2), (0.5, 3), (-0.1, 0)])
 def test_forces_are_those_of_the_interval(seconds, k):
     np.testing.assert_allclose(ramp().forces_w(1.0 + seconds), np.full((4, 3), k * FORCE_UNIT))
+
+
+def test_a_foot_that_stands_for_a_part_of_the_interval_pushes_harder_meanwhile():
+    """The impulse of the interval is the planned one, until so little is left of it that forces would be a blow."""
+    contact = np.tile([1.0, 0.5, 0.1, 0.0], (4, 1))
+    forces = replace(ramp(), contact=contact).forces_w(1.0 + 1.5 * DT)
+    np.testing.assert_allclose(forces, FORCE_UNIT * np.tile([[1.0], [2.0], [4.0], [4.0]], 3))
 
 
 def at(standing, time_s: float, gait="trot"):
@@ -88,5 +95,5 @@ def test_a_trajectory_seen_from_elsewhere_is_the_same_in_the_world():
     frame = Frame(np.array([1.0, 2.0, 0.0]), 0.7)
     states, inputs = plan.shifted(1.0, frame, REFERENCE, NOMINAL)
     np.testing.assert_allclose(WORLD.states(states, frame)[:-1], plan.states[:-1], atol=1e-12)
-    seen = Trajectory(1.0, plan.gait, plan.dt, states, inputs, frame)
+    seen = Trajectory(1.0, plan.gait, plan.dt, states, inputs, THROUGHOUT, frame)
     np.testing.assert_allclose(seen.forces_w(1.0), plan.forces_w(1.0), atol=1e-12)
