@@ -20,6 +20,7 @@ from go1_mtl_gym.validation import integer_in, number_in, one_of, parameters_of,
 DEFAULT_TASKS = BUILT_IN_TASKS
 """What an environment knows unless told otherwise, besides its own task: the tasks of the policy in the package."""
 DEFAULT_CHANNELS = ("command", "phase", "last_action", "leg_kinematics")
+DEFAULT_HISTORY = 3
 """What an environment shows unless told otherwise: the channels that the policy in the package sees."""
 RENDER_MODES = ("human", "rgb_array")
 PIXELS = (16, 4096)
@@ -73,7 +74,7 @@ class EnvConfig:
     task: str | None = "trot"
     tasks: tuple[str, ...] = None  # type: ignore[assignment]  # None never stays
     channels: tuple[str, ...] = DEFAULT_CHANNELS
-    history: int = 1
+    history: int = DEFAULT_HISTORY
     control_hz: int = 50
     kp: float = 50.0
     kd: float = 2.0

@@ -13,6 +13,7 @@ from go1_mtl_gym.validation import finite_vector, number_in
 Range = tuple[float, float] | None
 _OF_SENSORS = {"encoder_offset": "encoder_offset", "sensor_delay_s": "delay_s"}
 """Ranges of fields of `SensorParams`."""
+_CHANCES = {"fraction": "fraction of randomized episodes", "each": "each, the probability of being drawn"}
 SETTLE_S = (0.0, 10.0)
 """Shortest and longest time for which a robot may stand before an episode begins [s]."""
 
@@ -47,6 +48,8 @@ class DomainRandomization:
         sensor_delay_s: age of the readings [s].
         settle_s: time for which the robot stands before the episode begins [s].
         fraction: of the episodes that are randomized; the others are as without randomization.
+        each: probability with which each of the figures is drawn in such an episode; the others are the environment's
+            own. Below 1 there are episodes in which only one or two things differ, which are what a robot meets.
 
     Raises:
         InvalidInputError: if a range is not low <= high, or one of its ends is an impossible figure.
@@ -59,17 +62,18 @@ class DomainRandomization:
     joint_friction: Range = (0.0, 1.0)
     rotor_inertia: Range = (0.0, 0.01)
     contact_time_s: Range = (0.005, 0.16)
-    noise: Range = (0.0, 1.5)
+    noise: Range = (0.0, 2.0)
     joint_damping: Range = (0.0, 1.0)
     encoder_offset: Range = (0.0, 0.06)
     sensor_delay_s: Range = (0.0, 0.02)
     settle_s: Range = (0.0, 0.5)
     fraction: float = 1.0
+    each: float = 1.0
 
     def __post_init__(self) -> None:
         """Check the ranges, and bring them into one form."""
-        fraction = number_in(self.fraction, 0.0, 1.0, "fraction of randomized episodes")
-        object.__setattr__(self, "fraction", fraction)
+        for name, label in _CHANCES.items():
+            object.__setattr__(self, name, number_in(getattr(self, name), 0.0, 1.0, label))
         for name, (low, high) in self._ranges().items():
             if low > high:
                 raise InvalidInputError(f"range of {name} must be low <= high, got {(low, high)}")
@@ -91,11 +95,13 @@ class DomainRandomization:
             rng: where the randomness comes from.
             base: the environment's own figures.
         """
-        chance, *levels = rng.uniform(size=len(fields(self))).tolist()
-        level = dict(zip((each.name for each in fields(self)), levels))
+        names = [each.name for each in fields(self) if each.name not in _CHANCES]
+        chance, *levels = rng.uniform(size=1 + len(names)).tolist()
+        level, drawn_at = dict(zip(names, levels)), dict(zip(names, rng.uniform(size=len(names)).tolist()))
         drawn = {
             name: min(low + level[name] * (high - low), high)  # rounding must not lead beyond the end
             for name, (low, high) in self._ranges().items()
+            if drawn_at[name] < self.each
         }
         noise, settle_s = drawn.pop("noise", base.noise), drawn.pop("settle_s", base.settle_s)
         faults = {own: drawn.pop(name) for name, own in _OF_SENSORS.items() if name in drawn}
@@ -106,7 +112,7 @@ class DomainRandomization:
 
     def _ranges(self) -> dict[str, tuple[float, float]]:
         """The ranges that are not None, by name."""
-        given = {each.name: getattr(self, each.name) for each in fields(self) if each.name != "fraction"}
+        given = {each.name: getattr(self, each.name) for each in fields(self) if each.name not in _CHANCES}
         return {
             name: tuple(finite_vector(ends, 2, f"range of {name}").tolist())
             for name, ends in given.items()

@@ -141,31 +141,34 @@ def watch(
     """Let a policy drive, and record what it did; no expert is asked.
 
     Args:
-        policy: with ``predict(obs, deterministic=True)``, `env_kwargs` and `contract`, of one frame of proprioception;
+        policy: with ``predict(obs, deterministic=True)``, `env_kwargs` and `contract`;
             a `Learner` keeps its state, if it has one.
         task: name of the task that every episode begins in.
         seed: of everything random.
         seconds: duration of the kept rows [s].
         perturbation: as in `CollectJob`.
-        history: frames of proprioception that are recorded; the policy sees the newest.
+        history: frames of proprioception that are recorded; the policy sees as many as it was made for.
         make_env: another environment factory.
         env_kwargs: of the environment; on top of the policy's own ``env_kwargs``.
 
     Raises:
-        InvalidInputError: if the policy sees several frames or was made for another environment, the seed is negative
+        InvalidInputError: if the policy sees more frames or was made for another environment, the seed is negative
             or the seconds are not positive.
         CollectionError: if falls leave less than a fifth of the steps.
     """
-    if policy.contract.history != 1:
-        raise InvalidInputError(f"a policy of one frame of proprioception was expected, got {policy.contract.history}")
+    frames = policy.contract.history
+    if frames > history:
+        raise InvalidInputError(
+            f"the policy sees {frames} frames of proprioception, history must be that or more, got {history}"
+        )
     job = CollectJob(task, seed, seconds, None, perturbation, {**policy.env_kwargs, **env_kwargs, "history": history})
     env = make_env(task, perturbation, **{"episode_s": EPISODE_S, **job.env_kwargs})
     try:
         contract = base_env(env).contract
         layout = contract.layout
-        newest = ObservationLayout(contract.tasks, contract.channels)
-        policy.contract.check(contract.with_terms(terms_of(newest)), "the policy", "the environment")
-        columns, learner = layout.columns(newest), Learner(policy)
+        shown = ObservationLayout(contract.tasks, contract.channels, frames)
+        policy.contract.check(contract.with_terms(terms_of(shown)), "the policy", "the environment")
+        columns, learner = layout.columns(shown), Learner(policy)
         return _record(env, job, lambda obs, begins: learner.act(obs[columns], np.array([begins])))
     finally:
         env.close()

@@ -10,7 +10,7 @@ from typing import Any, get_args
 import numpy as np
 
 from go1_mtl_gym import BUILT_IN_TASKS, DomainRandomization
-from go1_mtl_gym.env_config import DEFAULT_CHANNELS
+from go1_mtl_gym.env_config import DEFAULT_CHANNELS, DEFAULT_HISTORY
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.sensing.observation import CHANNELS
 from go1_mtl_gym.tasks import check_task_names
@@ -28,6 +28,8 @@ NOISE_RAD = 0.06
 """Largest standard deviation of the noise on the expert's actions in perturbed demonstrations [rad]."""
 ROUND_NOISE_RAD = 0.02
 """The same in DAgger rounds, where the learner perturbs enough [rad]."""
+EACH = 0.5
+"""Probability with which each figure of the world is drawn in a randomized episode."""
 DEVICES = ("cpu", "cuda")
 
 
@@ -63,6 +65,7 @@ class JobConfig:
             rounds they come half as often. None pushes hard nowhere.
         randomized: fraction of the episodes in rounds whose physics and sensors are drawn, by the ranges of
             `go1_mtl_gym.DomainRandomization`.
+        world_s: length of the episodes that may be randomized [s]; the next one has another world.
         task_interval: shortest and longest time between changes of gait in perturbed episodes without an operator, or
             None.
         corner_fraction: probability with which a new command in these is a corner of its range.
@@ -94,7 +97,7 @@ class JobConfig:
     device: str = "cpu"
     threads: int = _from(1, 1)
     channels: tuple[str, ...] = DEFAULT_CHANNELS
-    history: int = _from(1, 1)
+    history: int = _from(1, DEFAULT_HISTORY)
     control_hz: int = _from(1, 50)
     kp: float = _from(0, 50.0, above=True)
     kd: float = _from(0, 2.0)
@@ -107,6 +110,7 @@ class JobConfig:
     hard_push_interval: float | None = _from(0, 4.0, above=True)
     held_out_s: float = _from(0, 60.0, above=True)
     randomized: float = _from(0, 0.3)
+    world_s: float = _from(0, 5.0, above=True)
     task_interval: tuple[float, float] | None = (2.0, 6.0)
     corner_fraction: float = _from(0, 0.25)
     mirror: bool = True
@@ -186,13 +190,15 @@ class JobConfig:
         """Of the paper-literal policy: the 34 numbers and the task id."""
         return self.env_kwargs | {"channels": (), "history": 1}
 
-    @staticmethod
-    def randomization_kwargs(fraction: float) -> dict[str, Any]:
+    def randomization_kwargs(self, fraction: float) -> dict[str, Any]:
         """What environments have on top of `env_kwargs` if a fraction of their episodes is randomized.
 
         Their expert is told what was drawn; the student must find out.
         """
-        return {"randomization": DomainRandomization(fraction=fraction), "privileged": True} if fraction else {}
+        if not fraction:
+            return {}
+        randomization = DomainRandomization(fraction=fraction, each=EACH)
+        return {"randomization": randomization, "privileged": True, "episode_s": self.world_s}
 
     def perturbation(self, noise_rad: float, hard_push_interval: float | None = None) -> PerturbationConfig:
         """How an episode is perturbed.

@@ -57,8 +57,12 @@ class PhaseFreePolicy(SavedPolicy, ForEnvironment, BasePolicy):
     def __init__(self, student: MultiHeadPolicy, estimator: PhaseEstimator, correction: float = CORRECTION) -> None:
         layout = estimator.layout
         clocked = student_layout(student)
-        if not {"command", "phase"} <= set(clocked.channels) or clocked.history != 1:
-            raise InvalidInputError(f"the student must see command, phase and one frame, got {clocked.channels}")
+        if not {"command", "phase"} <= set(clocked.channels):
+            raise InvalidInputError(f"the student must see command and phase, got {clocked.channels}")
+        if clocked.history > layout.history:
+            raise InvalidInputError(
+                f"the estimator must read at least the student's {clocked.history} frames, got {layout.history}"
+            )
         if layout.tasks != clocked.tasks or layout.channels != without_phase(clocked.channels):
             raise InvalidInputError(
                 f"the estimator must have the tasks {clocked.tasks} and the channels "
@@ -84,7 +88,7 @@ class PhaseFreePolicy(SavedPolicy, ForEnvironment, BasePolicy):
         self._turn = np.array([1.0 / (gait.period * contract.control_hz) for gait in gaits])
         self._can_stand = np.array([gait.can_stand for gait in gaits])
         self._command = layout.slices["command"]
-        self._columns = layout.columns(phase_free_layout(student, 1))
+        self._columns = layout.columns(phase_free_layout(student, clocked.history))
         self._phase = clocked.slices["phase"].start
 
     def predict(  # type: ignore[override]  # flat spaces: never a dict
