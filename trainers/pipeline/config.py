@@ -210,7 +210,9 @@ class JobConfig:
         operator, several = self.operator, len(self.tasks) > 1
         if operator is not None:
             operator = dataclasses.replace(
-                operator if several else operator.of_one_gait(), hard_push_interval=hard_push_interval
+                operator if several else operator.of_one_gait(),
+                hard_push_interval=hard_push_interval,
+                deflection=self.margin * operator.deflection,
             )
         return PerturbationConfig(
             noise_rad=noise_rad,

@@ -29,10 +29,10 @@ PRESETS: dict[str, dict[str, Any]] = {
     },
     "shipped": {
         "clean_s": 30.0,
-        "perturbed_s": 450.0,
-        "hard_push_s": 900.0,
+        "perturbed_s": 300.0,
+        "hard_push_s": 750.0,
         "hard_push_interval": 2.5,
-        "randomized_s": 900.0,
+        "randomized_s": 750.0,
         "randomized": 0.5,
         "held_out_s": 30.0,
         "rounds": 4,
