@@ -94,4 +94,4 @@ def _trial(
         if not rollout.fallen:
             base.set_task(second)
         series = rollout.walk(round(after_s * base.control_hz))
-        return score(series, rollout.fallen, seed, (command,), base.control_hz, TASKS[second].gait)
+        return score(series, rollout.fallen, seed, (command,), base.control_hz, second)
