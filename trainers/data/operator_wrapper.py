@@ -8,7 +8,8 @@ import numpy as np
 from go1_mtl_gym import TASKS, Task
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.seeded_wrapper import SeededWrapper
-from trainers.data.operator import OperatorConfig, OperatorPlan, Push, draw_plan
+from trainers.data.operator import OperatorConfig
+from trainers.data.operator_plan import OperatorPlan, Push, draw_plan
 
 LONGEST_S = 600.0
 """Plans are drawn for episodes of up to this length [s]; afterwards the stick stays where it is."""
