@@ -1,6 +1,6 @@
 """The main job: expert demonstrations, cloning, DAgger, evaluation, pictures.
 
-    python examples/dagger.py                      15 to 30 minutes on 2 cores, results under runs/<date>
+    python examples/dagger.py                      about half an hour on two quiet cores, results under runs/<date>
     python examples/dagger.py --preset smoke       a few minutes, to see that everything works
 
 Every stage leaves its result on disk; Ctrl-C keeps what is done and the same command with ``--out`` goes on from there.

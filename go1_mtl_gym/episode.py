@@ -11,7 +11,8 @@ import numpy as np
 from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PHYSICS_HZ
 from go1_mtl_gym.env_config import EnvConfig
-from go1_mtl_gym.gaits import next_phase, passes
+from go1_mtl_gym.gait_change import GaitChange
+from go1_mtl_gym.gaits import next_phase
 from go1_mtl_gym.rewards import reward_terms
 from go1_mtl_gym.sensing.observation import SensorNoise
 from go1_mtl_gym.sensing.sensor_faults import SensorFaults
@@ -27,14 +28,6 @@ COMMAND_FILTER_S = 0.2
 """Time constant of the low-pass between a command and what expert and student see of it [s]."""
 COMMAND_SLEW = (3.0, 3.0, 6.0)
 """Largest change of the filtered command per second: vx, vy [m/s^2], yaw rate [rad/s^2]."""
-SHORTEST_TASK_S = 1.0
-"""A task that was changed to is asked for at least this long before the next one [s]."""
-SLACK_S = 1e-9
-"""Of times that are sums of control periods [s]."""
-CHANGE_FRACTION = 0.5
-"""A gait is changed while the filtered command is within this share of both gaits' `command_range`."""
-REACH, SLACK_COMMAND = 1.15, 0.02
-"""About within it: larger by this factor, and by this much [m/s, rad/s]."""
 RESET_JOINT_NOISE = 0.03
 """Largest deviation of a joint from the home pose after a reset [rad]."""
 FALLEN_HEIGHT = 0.14
@@ -77,7 +70,7 @@ class Episode:
         phase: the gait clock [cycles], in [0, 1).
         steps: control periods since the reset.
         time_s: since the reset [s].
-        next_task: what will be asked for as soon as the present gait can be left, or None.
+        gait_change: that waits until the present gait can be left, or None.
         task_since_s: since when the present task goes on [s], if it was begun as soon as the one before could be left.
     """
 
@@ -92,13 +85,13 @@ class Episode:
     phase: float = 0.0
     steps: int = 0
     time_s: float = 0.0
-    next_task: Task | None = None
+    gait_change: GaitChange | None = None
     task_since_s: float = -np.inf
 
     @property
     def requested_task(self) -> Task:
         """What was asked for last: the present task, or the one that waits until the present gait can be left."""
-        return self.next_task or self.task
+        return self.task if self.gait_change is None else self.gait_change.wanted
 
     @property
     def older_frames(self) -> list[np.ndarray]:
@@ -121,12 +114,12 @@ class Episode:
 
     def _pass(self, seconds: float) -> None:
         """Clock, task and command filter after some time, at most a control period."""
-        before, mark = self.phase, self.task.gait.change_phase
+        before, change, time_s = self.phase, self.gait_change, self.time_s + seconds
         self.phase = next_phase(self.task.gait, before, self.filtered_command, seconds)
-        leaves = mark is None or before == self.phase or passes(mark, before, self.phase)
-        if self.next_task is not None and leaves and self._may_change_to(self.next_task, self.time_s + seconds):
-            self._begin(self.next_task, self.time_s + seconds)
-        self.filtered_command = filtered(self._followed_command(), self.filtered_command, seconds)
+        if change is not None and change.begins_after(before, self.phase, self.filtered_command, time_s):
+            self._begin(change.wanted, 0.0, time_s)
+        followed = self.command if self.gait_change is None else self.gait_change.slowed(self.command)
+        self.filtered_command = filtered(followed, self.filtered_command, seconds)
 
     def ahead(self, physics_steps: int, period: int) -> "Episode":
         """The episode some time later, if nobody asks for anything else; this one stays as it is.
@@ -165,26 +158,6 @@ class Episode:
         """Ask for another (vx [m/s], vy [m/s], yaw rate [rad/s]), shape (3,)."""
         self.command = command
 
-    def _followed_command(self) -> np.ndarray:
-        """What the filter follows: the command; while a task waits to be begun, only as far as a change allows."""
-        if self.next_task is None:
-            return self.command
-        reach = self._change_reach(self.next_task)
-        return np.clip(self.command, -reach, reach)
-
-    def _change_reach(self, task: Task) -> np.ndarray:
-        """The largest |vx|, |vy| [m/s] and |yaw rate| [rad/s] with which to change to a task, shape (3,)."""
-        return CHANGE_FRACTION * np.minimum(self.task.command_range, task.command_range)
-
-    def _may_change_to(self, task: Task, time_s: float) -> bool:
-        """Whether, at a time, the present task has had its own, and the filtered command is about what a change allows.
-
-        The filter comes near a command soon, and never to it.
-        """
-        reach = REACH * self._change_reach(task) + SLACK_COMMAND
-        settled = time_s - self.task_since_s >= SHORTEST_TASK_S - SLACK_S
-        return settled and bool((np.abs(self.filtered_command) <= reach).all())
-
     def change_task(self, task: Task, phase: float | None) -> None:
         """Change the task: at once to a phase, or with None to phase 0 as soon as the present gait can be left.
 
@@ -192,14 +165,14 @@ class Episode:
         the present one first, and one that has changed just now finds its feet first.
         """
         if phase is not None:
-            self.task, self.phase, self.next_task, self.task_since_s = task, phase, None, -np.inf
-        elif task != self.task and self.task.gait.change_phase is None and self._may_change_to(task, self.time_s):
-            self._begin(task, self.time_s)
-        else:
-            self.next_task = None if task == self.task else task
+            self._begin(task, phase, -np.inf)
+            return
+        self.gait_change = None if task == self.task else GaitChange(self.task, task, self.task_since_s)
+        if self.gait_change is not None and self.gait_change.begins_at_once(self.filtered_command, self.time_s):
+            self._begin(task, 0.0, self.time_s)
 
-    def _begin(self, task: Task, time_s: float) -> None:
-        self.task, self.phase, self.next_task, self.task_since_s = task, 0.0, None, time_s
+    def _begin(self, task: Task, phase: float, since_s: float) -> None:
+        self.task, self.phase, self.gait_change, self.task_since_s = task, phase, None, since_s
 
     # -- Its reports ---------------------------------------------------------------------------------------------------
 

@@ -1,13 +1,13 @@
 """What makes demonstrations worth learning from: noise on actions, pushes, and commands and tasks that change."""
 
-from typing import Any, cast
+from typing import Any
 
 import gymnasium
 import numpy as np
 
 from go1_mtl_gym.deprecation import renamed_arguments
-from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.seeded_wrapper import SeededWrapper
 from go1_mtl_gym.tasks import TASKS, Task
 from go1_mtl_gym.validation import finite_vector, interval_s, number_in
 
@@ -16,7 +16,7 @@ NOISE_CORRELATION_S = 0.1
 
 
 @renamed_arguments(kick="push", kick_interval="push_interval", corner_share="corner_fraction")
-class PerturbationWrapper(gymnasium.Wrapper):
+class PerturbationWrapper(SeededWrapper):
     """Disturbs a Go1 so that its expert is seen recovering.
 
     Four disturbances, each drawn from this wrapper's own generator (seeded by ``reset(seed=...)``):
@@ -41,6 +41,8 @@ class PerturbationWrapper(gymnasium.Wrapper):
         InvalidInputError: if a figure is negative or not finite, or tasks are to change where there is only one.
     """
 
+    _STREAM = 0x9E3779B9
+
     def __init__(
         self,
         env: gymnasium.Env,
@@ -61,19 +63,12 @@ class PerturbationWrapper(gymnasium.Wrapper):
         self._task_interval = interval_s(task_interval, "task_interval")
         if task_interval is not None and len(self._go1.tasks) < 2:
             raise InvalidInputError(f"task_interval must be None for an environment of one task, got {task_interval}")
-        self._rng = np.random.default_rng()
-
-    @property
-    def _go1(self) -> Go1Env:
-        return cast(Go1Env, self.env.unwrapped)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
         """Reset the environment; a seed also seeds the disturbances."""
-        result = self.env.reset(seed=seed, options=options)
-        if seed is not None:
-            self._rng = np.random.default_rng([seed, 0x9E3779B9])
+        result = super().reset(seed=seed, options=options)
         self._sigma = self._rng.uniform(0.0, self._noise_rad) / self._go1.action_map.half_range
         self._noise = self._sigma * self._rng.standard_normal(12)
         self._next_push = self._rng.exponential(self._push_interval)

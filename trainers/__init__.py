@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from trainers.data.demonstrations import Demonstrations
     from trainers.data.environments import PerturbationConfig, make_env, make_venv
     from trainers.data.mirror import mirrored
-    from trainers.data.operator import OperatorConfig, draw_plan
+    from trainers.data.operator import OperatorConfig
+    from trainers.data.operator_plan import draw_plan
     from trainers.data.operator_wrapper import OperatorWrapper
     from trainers.data.stateful import Learner
     from trainers.evaluation.certificate import Certificate
@@ -80,7 +81,7 @@ _HOME = {
     "closest_task": "algorithms.add_task",
     "collect": "data.collection",
     "collect_all": "data.collection",
-    "draw_plan": "data.operator",
+    "draw_plan": "data.operator_plan",
     "evaluate": "evaluation.closed_loop",
     "evaluate_transition": "evaluation.gait_transitions",
     "joint_target_figure": "evaluation.figures",

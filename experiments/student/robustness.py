@@ -25,11 +25,16 @@ QUANTITIES: dict[str, tuple[str, tuple[float, ...]]] = {
     "motor_strength": ("motor strength", (0.9, 0.95, 1.0, 1.05, 1.1)),
     "joint_friction": ("joint friction [N m]", (0.0, 0.25, 0.5, 0.75, 1.0)),
     "rotor_inertia": ("rotor inertia [kg m²]", (0.0, 0.0025, 0.005, 0.0075, 0.01)),
-    "contact_time_s": ("contact time [s]", (0.005, 0.01, 0.02, 0.03, 0.04)),
+    "joint_damping": ("joint damping [N m s/rad]", (0.0, 0.25, 0.5, 0.75, 1.0)),
+    "contact_time_s": ("contact time [s]", (0.005, 0.02, 0.04, 0.08, 0.16)),
+    "settle_s": ("settling before the clock [s]", (0.0, 0.25, 0.5, 0.75, 1.0)),
+    "encoder_offset": ("encoder offset [rad]", (0.0, 0.015, 0.03, 0.045, 0.06)),
+    "sensor_delay_s": ("sensor delay [s]", (0.0, 0.005, 0.01, 0.015, 0.02)),
     "noise": ("noise, in units of the default", (0.0, 0.5, 1.0, 1.5, 2.0)),
 }
-"""Argument of `Go1Env` -> what it is called, and its values from one end of the range to the other. Noise is the
-policy's sensors' or the expert's estimator's."""
+"""Name of a quantity -> what it is called, and its values from one end of the range to the other; see `world`."""
+OF_SENSORS = {"encoder_offset": "encoder_offset", "sensor_delay_s": "delay_s"}
+"""Quantities that are fields of `SensorParams`. The expert's state has none of them."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +49,7 @@ class RobustnessOptions:
 
 
 class Robustness(Study):
-    """Friction, payload, delay, motors, contacts and noise, one at a time, of policies and the expert."""
+    """Friction, payload, delay, motors, joints, contacts, sensors and noise, one at a time, of policies and expert."""
 
     name = "student_robustness"
     title = "Another world"
@@ -52,7 +57,7 @@ class Robustness(Study):
         "In the middle of each range: survived and successful episodes with drawn commands that change; bold where "
         f"fewer than {TARGET:.0%}. The picture shows the whole ranges."
     )
-    caption = "Survival over friction, payload, delay, motors, contacts and noise, of student and expert"
+    caption = "Survival over one quantity of the world at a time, of student and expert"
     full = RobustnessOptions()
     quick = RobustnessOptions(1, 2.5, 1.5, every=4)
     code = EVALUATION_CODE
@@ -62,7 +67,8 @@ class Robustness(Study):
         return with_expert(self.policies)
 
     def cells(self, agent: Agent) -> list[Cell]:
-        return [Cell(task, quantity) for task in tasks_of(agent) for quantity in self.options.quantities]
+        felt = [name for name in self.options.quantities if agent.name != EXPERT or name not in OF_SENSORS]
+        return [Cell(task, quantity) for task in tasks_of(agent) for quantity in felt]
 
     def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:
         options, policy, levels = self.options, agent.load(), []
@@ -94,7 +100,12 @@ class Robustness(Study):
 
 
 def world(quantity: str, value: float, for_expert: bool) -> dict[str, Any]:
-    """Arguments of `Go1Env` that make a quantity have a value for a policy or the expert."""
+    """Arguments of `Go1Env` that make a quantity have a value for a policy or the expert.
+
+    Noise is the policy's sensors' or the expert's estimator's; what is no fault of sensors is an argument itself.
+    """
+    if quantity in OF_SENSORS:
+        return {"sensors": {OF_SENSORS[quantity]: value}}
     if quantity != "noise":
         return {quantity: value}
     return {"estimator_noise": EstimatorNoise().scaled(value)} if for_expert else {"noise": SensorNoise().scaled(value)}

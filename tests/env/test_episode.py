@@ -1,14 +1,13 @@
-"""The command filter, worked by hand, and the course of an episode: its clock, its stands, its changes of task."""
+"""The command filter, worked by hand, and the course of an episode: its clock, its stands, its beginning."""
 
 import dataclasses
-from collections import deque
 
 import numpy as np
 import pytest
 
 from go1_mtl_gym import GAITS, TASKS, InvalidInputError, robot
 from go1_mtl_gym.env import Go1Env
-from go1_mtl_gym.episode import COMMAND_SLEW, REACH, SLACK_COMMAND, Episode, filtered
+from go1_mtl_gym.episode import COMMAND_SLEW, filtered
 from go1_mtl_gym.gaits import STAND_COMMAND
 
 STILL = np.zeros(3)
@@ -100,34 +99,6 @@ def test_a_new_task_can_begin_at_a_phase():
     assert env.state.phase == 0.7 and env.task.name == "jump"
 
 
-def test_a_gait_that_flies_goes_on_until_the_middle_of_its_stance():
-    assert GAITS["jump"].change_phase == pytest.approx(0.275)
-    assert all(gait.change_phase is None for name, gait in GAITS.items() if name != "jump")
-    env = Go1Env("jump")
-    env.reset(seed=0, options={"command": (0.3, 0.0, 0.0)})
-    env.step(home(env)), env.step(home(env))
-    env.set_task("jump", phase=0.6)
-    env.set_task("trot")
-    seen = []
-    for _ in range(16):  # 0.675 cycles of 0.45 s are 15.2 steps
-        *_, info = env.step(home(env))
-        seen.append(info["task"])
-    assert seen == ["jump"] * 15 + ["trot"] and info["phase"] == 0.0
-    env.set_task("jump", phase=0.6)
-    env.set_task("trot")
-    env.set_task("walk"), env.set_task("jump")
-    for _ in range(40):
-        *_, info = env.step(home(env))
-    assert info["task"] == "jump", "the last word counts"
-
-
-def test_a_gait_that_rests_is_left_at_once():
-    env = Go1Env("jump")
-    env.reset(seed=0, options={"command": (0.0, 0.0, 0.0)})
-    env.set_task("trot")
-    assert env.step(home(env))[4]["task"] == "trot"
-
-
 def test_asking_for_the_present_task_leaves_its_clock_alone():
     env = Go1Env("trot")
     env.reset(seed=0, options={"command": (0.3, 0.0, 0.0)})
@@ -174,86 +145,3 @@ def test_a_settled_episode_has_its_full_length_and_the_commands_of_any_other():
 def test_an_impossible_time_to_settle_is_refused(settle_s):
     with pytest.raises(InvalidInputError, match=rf"settle_s \[s\] must .*{settle_s}"):
         Go1Env(settle_s=settle_s)
-
-
-# -- Too fast for a gait -----------------------------------------------------------------------------------------------
-
-
-def running(task, command, filtered_command=None):
-    episode = Episode(TASKS[task], np.array(command), deque(maxlen=1))
-    episode.filtered_command = np.array(command if filtered_command is None else filtered_command)
-    return episode
-
-
-def half_reach(first, second):
-    return 0.5 * np.minimum(TASKS[first].command_range, TASKS[second].command_range)
-
-
-def until_it_changes(episode):
-    """The filtered commands from now until the task that waits is begun."""
-    seen, before = [], episode.task
-    while episode.task == before:
-        seen.append(episode.filtered_command)
-        episode.advance(np.zeros(12), 0.02)
-        assert len(seen) < 100
-    return np.array([*seen, episode.filtered_command])
-
-
-def test_a_robot_that_is_too_fast_slows_down_to_half_before_it_changes_its_gait():
-    episode = running("trot", (1.6, 0.0, 0.0))
-    episode.change_command(np.array([0.7, 0.0, 0.0]))
-    episode.change_task(TASKS["walk"], None)
-    assert episode.task.name == "trot" and episode.requested_task.name == "walk"
-    forward = until_it_changes(episode)[:, 0]
-    reach = half_reach("trot", "walk")[0]
-    assert forward[0] == 1.6 and forward[-2] <= REACH * reach + SLACK_COMMAND and (np.diff(forward[:-1]) < 0).all()
-    assert episode.task.name == "walk" and episode.phase == 0.0
-    for _ in range(100):
-        episode.advance(np.zeros(12), 0.02)
-    assert episode.filtered_command[0] == pytest.approx(0.7, abs=1e-3)  # and goes on as it was told
-
-
-def test_every_component_counts():
-    for axis in range(3):
-        command = 1.3 * half_reach("trot", "pace") * (np.arange(3) == axis)
-        episode = running("trot", command)
-        episode.change_task(TASKS["pace"], None)
-        assert episode.task.name == "trot"
-
-
-def test_a_robot_that_is_slow_enough_changes_at_once():
-    episode = running("trot", half_reach("trot", "walk"))
-    episode.change_task(TASKS["walk"], None)
-    assert episode.task.name == "walk" and episode.phase == 0.0 and episode.next_task is None
-
-
-def test_a_command_beyond_the_new_gaits_range_does_not_keep_it_waiting():
-    beyond = TASKS["walk"].command_limit[0]
-    episode = running("trot", (beyond, 0.0, 0.0))
-    episode.change_task(TASKS["walk"], None)
-    until_it_changes(episode)
-    assert episode.task.name == "walk" and episode.command[0] == beyond
-
-
-def test_a_phase_begins_a_gait_at_any_speed():
-    episode = running("trot", (0.3, 0.0, 0.0), (1.6, 0.0, 0.0))
-    episode.change_task(TASKS["walk"], 0.25)
-    assert episode.task.name == "walk" and episode.phase == 0.25
-
-
-def test_while_a_gait_waits_the_present_one_does_not_speed_up():
-    episode = running("jump", (0.0, 0.0, 0.0))
-    episode.phase = 0.5
-    episode.change_task(TASKS["bound"], None)
-    episode.change_command(np.array([TASKS["bound"].command_range[0], 0.0, 0.0]))
-    reached = until_it_changes(episode)[:, 0]
-    assert len(reached) > 3 and reached[:-1].max() <= half_reach("jump", "bound")[0]
-
-
-def test_a_gait_that_was_changed_to_goes_on_for_a_second():
-    episode = running("trot", (0.0, 0.0, 0.0), (0.1, 0.0, 0.0))
-    episode.change_task(TASKS["walk"], None)
-    assert episode.task.name == "walk"
-    for name in ("trot", "pace"):  # the last button counts
-        episode.change_task(TASKS[name], None)
-    assert len(until_it_changes(episode)) - 1 == 50 and episode.task.name == "pace"

@@ -18,6 +18,7 @@ from go1_mtl_gym import TASKS, Go1Env, InvalidInputError, robot
 from go1_mtl_gym.actuation import ActionMap, PDGains
 from go1_mtl_gym.sensing.observation import SensorNoise
 from go1_mtl_gym.sensing.state_noise import EstimatorNoise
+from go1_mtl_gym.sim.domain_randomization import DomainRandomization
 from trainers.pipeline.new_policy import new_policy
 
 HOME = ActionMap.for_gains(PDGains()).from_radians(robot.HOME_POSE)
@@ -85,6 +86,21 @@ def test_noise_is_the_sensors_or_the_estimators():
     doubled = robustness.world("noise", 2.0, for_expert=True)["estimator_noise"]
     assert (doubled.dq, doubled.height_bias) == (2 * EstimatorNoise().dq, 2 * EstimatorNoise().height_bias)
     assert robustness.world("friction", 0.4, for_expert=True) == {"friction": 0.4}
+
+
+def test_faults_of_the_sensors_are_given_together_and_are_the_policies_alone():
+    assert robustness.world("encoder_offset", 0.03, for_expert=False) == {"sensors": {"encoder_offset": 0.03}}
+    assert robustness.world("sensor_delay_s", 0.01, for_expert=False) == {"sensors": {"delay_s": 0.01}}
+    study = robustness.Robustness(robustness.RobustnessOptions())
+    policys, experts = ({cell.condition for cell in study.cells(agent)} for agent in (STANDING, Agent(EXPERT)))
+    assert policys == set(robustness.QUANTITIES) and policys - experts == {"encoder_offset", "sensor_delay_s"}
+
+
+def test_what_environments_are_drawn_from_is_within_what_is_measured():
+    ranges = DomainRandomization()
+    for quantity, (_, values) in robustness.QUANTITIES.items():
+        low, high = getattr(ranges, quantity)
+        assert values[0] <= low and high <= values[-1], quantity
 
 
 @pytest.mark.parametrize("quantity", robustness.QUANTITIES)

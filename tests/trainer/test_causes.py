@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from go1_mtl_gym import TASKS
 from trainers.evaluation.causes import cause_of
 from trainers.evaluation.scoring import EpisodeRecord, Series
 
@@ -25,7 +24,6 @@ def episode(command=(0.4, 0.0, 0.0), until=STEPS, events=None, moves=None, tasks
         wanted=commands,
         contacts=np.ones((STEPS, 4), dtype=bool),
         running=np.ones(STEPS, dtype=bool),
-        gaits=tuple(TASKS[task].gait for task in tasks),
         commands=commands,
         tasks=tasks,
         moves=(moves or ("hold",) * STEPS) if hands else (),

@@ -11,9 +11,8 @@ from torch import nn
 
 from go1_mtl_gym.contract import ObservationTerm, PolicyContract
 from go1_mtl_gym.errors import InvalidInputError
-from trainers.algorithms.bc import BCConfig, BCHistory, train_bc
+from trainers.algorithms.bc import BCConfig, BCHistory, train_bc, with_images
 from trainers.data.demonstrations import Demonstrations
-from trainers.data.mirror import with_mirrored
 from trainers.evaluation.metrics import BATCH, offline_metrics
 from trainers.policies.multi_head import MultiHeadPolicy
 
@@ -56,8 +55,8 @@ def learn_task(
         raise InvalidInputError(f"a policy with heads and rows were expected, got a {kind} and {len(dataset)} rows")
     more: dict[str, Any] = {"logger": logger, "progress": progress, "fit_normalization": False}
     if rehearsal is None:
-        if config is not None and config.mirror:  # what the trunk makes of a row has no mirror image
-            dataset, config = with_mirrored(dataset)[0], dataclasses.replace(config, mirror=False)
+        # here already, because what the trunk makes of a row has no mirror image
+        dataset, config = with_images(dataset, config or BCConfig())
         names = tuple(dataset.per_task())
         rows = trunk_features(policy, dataset).with_tasks(names)
         held_out = None if validation is None else trunk_features(policy, validation).with_tasks(names)

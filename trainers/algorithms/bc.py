@@ -249,6 +249,13 @@ def _optimizer(
     return optimizer, schedule
 
 
+def with_images(dataset: Demonstrations, config: BCConfig) -> tuple[Demonstrations, BCConfig]:
+    """Rows and their mirror images if a configuration wants them, and the configuration that wants no more."""
+    if not config.mirror:
+        return dataset, config
+    return with_mirrored(dataset)[0], dataclasses.replace(config, mirror=False)
+
+
 def train_bc(
     policy: MultiHeadPolicy,
     dataset: Demonstrations,
@@ -281,8 +288,7 @@ def train_bc(
     dataset = dataset.fitted_to(policy.contract)
     validation = None if validation is None else validation.fitted_to(policy.contract)
     check_batch_size(min(config.batch_size, len(dataset)), dataset)
-    if config.mirror:  # once, for normalization and training alike
-        dataset, config = with_mirrored(dataset)[0], dataclasses.replace(config, mirror=False)
+    dataset, config = with_images(dataset, config)  # once, for normalization and training alike
     if fit_normalization:
         policy.fit_normalization(dataset.obs, dataset.acts)
     return BCTrainer(policy, config, logger).fit(dataset, validation, progress, on_batch_end)

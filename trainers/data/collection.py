@@ -17,13 +17,13 @@ from tqdm.auto import tqdm
 from go1_mtl_gym.contract import PolicyContract, terms_of
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
 from go1_mtl_gym.sensing.observation import ObservationLayout
-from go1_mtl_gym.validation import finite_vector, integer_in
+from go1_mtl_gym.validation import finite_vector
 from trainers.data.demonstrations import Demonstrations
 from trainers.data.environments import EnvFactory, PerturbationConfig, WithTasks, base_env, derive_seed, make_env
 from trainers.data.stateful import Learner
 from trainers.utils.files import json_form
 from trainers.utils.processes import keep_interrupts
-from trainers.utils.validation import positive
+from trainers.utils.validation import checked_seed, positive
 
 BEFORE_FALL_S = 0.24
 """The last seconds before a fall are not worth imitating and are dropped [s]."""
@@ -67,7 +67,7 @@ class CollectJob:
 
     def __post_init__(self) -> None:
         set_field = functools.partial(object.__setattr__, self)
-        set_field("seed", integer_in(self.seed, 0, 2**63 - 1, "seed"))
+        set_field("seed", checked_seed(self.seed))
         set_field("seconds", positive(self.seconds, "seconds"))
         if self.command is not None:
             set_field("command", tuple(finite_vector(self.command, 3, "command (vx, vy, yaw rate)").tolist()))

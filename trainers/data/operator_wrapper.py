@@ -1,19 +1,21 @@
 """An environment in somebody's hands."""
 
-from typing import Any, cast
+from typing import Any
 
 import gymnasium
 import numpy as np
 
-from go1_mtl_gym import TASKS, Go1Env, Task
+from go1_mtl_gym import TASKS, Task
 from go1_mtl_gym.errors import InvalidInputError
-from trainers.data.operator import OperatorConfig, OperatorPlan, Push, draw_plan
+from go1_mtl_gym.seeded_wrapper import SeededWrapper
+from trainers.data.operator import OperatorConfig
+from trainers.data.operator_plan import OperatorPlan, Push, draw_plan
 
 LONGEST_S = 600.0
 """Plans are drawn for episodes of up to this length [s]; afterwards the stick stays where it is."""
 
 
-class OperatorWrapper(gymnasium.Wrapper):
+class OperatorWrapper(SeededWrapper):
     """Moves the stick, changes the gait and pushes the robot as `draw_plan` says.
 
     A reset with a seed draws a plan that depends on that seed and the task alone, so that every policy meets the same
@@ -27,20 +29,17 @@ class OperatorWrapper(gymnasium.Wrapper):
         config: how often hands do what; None is the default.
     """
 
+    _STREAM = 0x5EED_0F
+
     def __init__(self, env: gymnasium.Env, config: OperatorConfig | None = None) -> None:
         super().__init__(env)
         self.operator = config or OperatorConfig()
-        self._rng = np.random.default_rng()
         self._plan: OperatorPlan | None = None
 
     @property
     def plan(self) -> OperatorPlan | None:
         """What the hands do in this episode; None before the first reset."""
         return self._plan
-
-    @property
-    def _go1(self) -> Go1Env:
-        return cast(Go1Env, self.env.unwrapped)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -59,9 +58,7 @@ class OperatorWrapper(gymnasium.Wrapper):
                 f"the operator gives the commands; got the reset option command={options['command']!r}"
             )
         env = self._go1
-        observation, info = self.env.reset(seed=seed, options=options)
-        if seed is not None:
-            self._rng = np.random.default_rng([seed, 0x5EED_0F])
+        observation, info = super().reset(seed=seed, options=options)
         seconds = min(env.config.episode_s, LONGEST_S) + 1.0
         self._plan = draw_plan(self.operator, env.task.name, env.tasks, seconds, self._rng)
         self._move_stick(self._plan, 0.0)

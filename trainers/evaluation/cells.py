@@ -12,7 +12,7 @@ from trainers.evaluation.episodes import EpisodeSetup
 from trainers.evaluation.metrics import exact_interval, lower_bound, mcnemar
 from trainers.evaluation.stopping import Plan
 from trainers.utils.files import json_form, json_ready
-from trainers.utils.validation import positive
+from trainers.utils.validation import checked_seed, positive
 
 ALL_GAITS = "all gaits"
 """Stands for the task of a cell whose episodes are tours."""
@@ -49,7 +49,7 @@ class Settings:
         for name in ("seconds", "tour_seconds"):
             object.__setattr__(self, name, positive(getattr(self, name), name))
         integer_in(self.tours, 1, 10**6, "tours")
-        integer_in(self.seed, 0, 2**63 - 1, "seed")
+        checked_seed(self.seed)
         if self.episodes is not None:
             integer_in(self.episodes, 1, 10**6, "episodes")
         object.__setattr__(self, "gaits", tuple(self.gaits))

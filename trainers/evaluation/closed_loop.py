@@ -11,7 +11,7 @@ from trainers.data.operator import OperatorConfig
 from trainers.evaluation.episodes import EpisodeSetup
 from trainers.evaluation.rollout import checked_agent, run_all
 from trainers.evaluation.scoring import ClosedLoopResult, EpisodeRecord
-from trainers.utils.validation import checked_jobs, positive, refuse_overridden
+from trainers.utils.validation import checked_jobs, checked_seed, positive, refuse_overridden
 
 
 def evaluate(
@@ -59,7 +59,7 @@ def evaluate(
         InvalidInputError: if an argument is not as described, or the policy is for another environment.
     """
     one_of(task, tuple(TASKS), "task")
-    episodes, seed = integer_in(episodes, 1, 10**9, "episodes"), integer_in(seed, 0, 2**63 - 1, "seed")
+    episodes, seed = integer_in(episodes, 1, 10**9, "episodes"), checked_seed(seed)
     seconds, n_jobs = positive(seconds, "seconds"), checked_jobs(n_jobs)
     if commands is not None and len(commands) == 0:
         raise InvalidInputError("commands must be None or hold at least one (vx, vy, yaw rate), got none")

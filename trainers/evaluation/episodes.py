@@ -82,5 +82,5 @@ class EpisodeSetup:
             series = rollout.walk(steps, before_step)
             if watch is not None:
                 watch(env, len(series.measured))
-        gait = TASKS[self.task].gait if self.operator is None else None
-        return score(series, rollout.fallen, self.seed, tuple(given), base.control_hz, gait), series
+        task = self.task if self.operator is None else None
+        return score(series, rollout.fallen, self.seed, tuple(given), base.control_hz, task), series

@@ -9,7 +9,7 @@ from go1_mtl_gym.validation import integer_in, number_in, one_of
 from trainers.data.environments import EnvFactory, base_env, derive_seed, make_env
 from trainers.evaluation.rollout import Rollout, checked_agent, opened, run_all
 from trainers.evaluation.scoring import ClosedLoopResult, EpisodeRecord, score
-from trainers.utils.validation import checked_jobs, positive, refuse_overridden
+from trainers.utils.validation import checked_jobs, checked_seed, positive, refuse_overridden
 
 
 def evaluate_transition(
@@ -59,7 +59,7 @@ def evaluate_transition(
     kwargs = {"tasks": tuple(TASKS), **getattr(policy_or_expert, "env_kwargs", {}), **env_kwargs}
     for task in (first, second):
         one_of(task, tuple(kwargs["tasks"]), "task")
-    trials, seed = integer_in(trials, 1, 10**9, "trials"), integer_in(seed, 0, 2**63 - 1, "seed")
+    trials, seed = integer_in(trials, 1, 10**9, "trials"), checked_seed(seed)
     before_s, after_s = number_in(before_s, 0.0, 1e6, "before_s"), positive(after_s, "after_s")
     n_jobs = checked_jobs(n_jobs)
     kwargs["episode_s"] = before_s + TASKS[first].gait.period + after_s + 1.0
@@ -94,4 +94,4 @@ def _trial(
         if not rollout.fallen:
             base.set_task(second)
         series = rollout.walk(round(after_s * base.control_hz))
-        return score(series, rollout.fallen, seed, (command,), base.control_hz, TASKS[second].gait)
+        return score(series, rollout.fallen, seed, (command,), base.control_hz, second)

@@ -10,7 +10,6 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 from tqdm.auto import tqdm
 
-from go1_mtl_gym import TASKS
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.expert import check_expert_fits
 from go1_mtl_gym.validation import finite_vector
@@ -167,7 +166,6 @@ class Rollout:
             wanted=np.array([info["filtered_command"] for info in told], dtype=float).reshape(-1, 3),
             contacts=np.array([info["contacts"] for info in told], dtype=bool).reshape(-1, 4),
             running=np.array(running, dtype=bool),
-            gaits=tuple(TASKS[info["task"]].gait for info in told),
             commands=np.array([info["command"] for info in told], dtype=float).reshape(-1, 3),
             tasks=tuple(info["task"] for info in told),
             moves=tuple(info["operator_move"] for info in told if "operator_move" in info),

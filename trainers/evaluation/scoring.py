@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from go1_mtl_gym import Gait
+from go1_mtl_gym import TASKS, Gait
 from trainers.evaluation.metrics import exact_interval, touchdowns, tracking_error
 from trainers.utils.files import json_ready
 
@@ -32,9 +32,8 @@ class Series:
         wanted: the filtered command, shape (n, 3).
         contacts: feet on the ground, bool, shape (n, 4).
         running: whether the gait clock ran during the step, bool, shape (n,).
-        gaits: that the clock was of, after each step.
         commands: as asked for, shape (n, 3).
-        tasks: names of the tasks, after each step.
+        tasks: names of the tasks whose gait the clock was of, after each step.
         moves: what the hands were doing, if there are any; empty otherwise.
         events: what they did in each step besides: "push", or the name of a task; empty without hands.
     """
@@ -43,11 +42,15 @@ class Series:
     wanted: np.ndarray
     contacts: np.ndarray
     running: np.ndarray
-    gaits: tuple[Gait, ...]
     commands: np.ndarray
     tasks: tuple[str, ...]
     moves: tuple[str, ...] = ()
     events: tuple[tuple[str, ...], ...] = ()
+
+    @property
+    def gaits(self) -> tuple[Gait, ...]:
+        """Of the tasks, after each step."""
+        return tuple(TASKS[name].gait for name in self.tasks)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -152,7 +155,7 @@ def score(
     seed: int,
     commands: tuple[tuple[float, float, float], ...],
     control_hz: float,
-    gait: Gait | None = None,
+    task: str | None = None,
 ) -> EpisodeRecord:
     """Figures of one episode.
 
@@ -162,10 +165,10 @@ def score(
         seed: kept in the record.
         commands: likewise.
         control_hz: steps per second.
-        gait: what was asked for all the time; None where it changed: what the environment says it was.
+        task: name of what was asked for all the time; None where it changed: what the environment says it was.
     """
-    if gait is not None:
-        series = dataclasses.replace(series, gaits=(gait,) * len(series.gaits))
+    if task is not None:
+        series = dataclasses.replace(series, tasks=(task,) * len(series.tasks))
     skip, steps = round(SETTLE_S * control_hz), len(series.measured)
     window = max(1, round(max((gait.period for gait in series.gaits), default=0.0) * control_hz))
     velocity_error, yaw_error = tracking_error(series.measured, series.wanted, window, skip)

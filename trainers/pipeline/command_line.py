@@ -34,7 +34,13 @@ def job_parser() -> argparse.ArgumentParser:
         formatter_class=argparse.ArgumentDefaultsHelpFormatter,
     )
     add = parser.add_argument
-    add("--preset", choices=[*PRESETS], default="default", help="smoke: minutes; default: half an hour; paper: a day")
+    add(
+        "--preset",
+        choices=[*PRESETS],
+        default="default",
+        help="smoke: a few minutes; default: about half an hour on two quiet cores; shipped, for policies like those "
+        "in the package: one to two hours (an estimate); paper: a day (an estimate)",
+    )
     add("--out", help="folder of the results; an interrupted run goes on in the same one (default: runs/<date>)")
     add("--tasks", nargs="+", choices=tuple(TASKS), help="gaits, in head order; the preset's if not given")
     add("--rounds", type=int, default=None, help="DAgger rounds; the preset's if not given")

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.validation import integer_in
 
 
 def positive(value: object, name: str) -> float:
@@ -19,6 +20,15 @@ def positive(value: object, name: str) -> float:
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real) or not 0 < float(value) < math.inf:
         raise InvalidInputError(f"{name} must be a finite number > 0, got {value!r}")
     return float(value)
+
+
+def checked_seed(seed: object) -> int:
+    """Return a seed that episodes or shards can be drawn from.
+
+    Raises:
+        InvalidInputError: if it is no whole number in [0, 2^63).
+    """
+    return integer_in(seed, 0, 2**63 - 1, "seed")
 
 
 def checked_jobs(n_jobs: object) -> int:
