@@ -21,6 +21,7 @@ STUDIES = {
     "student_transitions": "experiments.student.transitions:Transitions",
     "student_robustness": "experiments.student.robustness:Robustness",
     "student_pushes": "experiments.student.pushes:Pushes",
+    "student_hands": "experiments.student.hands:Hands",
     "student_ablation": "experiments.student.ablation:Ablation",
     "student_budget": "experiments.student.budget:Budget",
     "student_ppo": "experiments.student.ppo:ReinforcementLearning",

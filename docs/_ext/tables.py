@@ -23,6 +23,7 @@ from go1_mtl_gym import (
 from go1_mtl_gym.actuation import ActionMap
 from go1_mtl_gym.sensing.observation import CHANNELS, UNITS, ObservationLayout
 from trainers.data.operator import MOVES, OperatorConfig
+from trainers.evaluation.conditions import CONDITIONS
 from trainers.pipeline.command_line import job_parser
 from trainers.pipeline.config import JobConfig
 from trainers.pipeline.presets import PRESETS
@@ -263,6 +264,15 @@ def operator_settings() -> str:
     return markdown(("field", "default", "meaning"), rows)
 
 
+def conditions() -> str:
+    """What `trainers.certify` knows by name."""
+    rows = [
+        (f"`{name}`", each.title, "nominal" if each.claim is None else f"{each.claim:.2%}", each.judged_by)
+        for name, each in CONDITIONS.items()
+    ]
+    return markdown(("name", "condition", "claim", "judged by"), rows)
+
+
 def studies() -> str:
     """Every study: what it measures, and what it took when it was published."""
     rows = []
@@ -305,6 +315,7 @@ TABLES: dict[str, Callable[[], str]] = {
         operator_moves,
         operator_settings,
         job_options,
+        conditions,
         studies,
     )
 }

@@ -11,7 +11,7 @@ import trainers
 from experiments.agents import EXPERT, STUDENT, Agent, PolicyFile, policy_files, shipped, with_expert
 from experiments.pushing import push_w
 from experiments.results import Results
-from experiments.student import ablation, budget, commanded, phase, phase_free, pushes, robustness
+from experiments.student import ablation, budget, commanded, hands, phase, phase_free, pushes, robustness
 from experiments.student.episodes import counts
 from experiments.study import Cell
 from go1_mtl_gym import TASKS, Go1Env, InvalidInputError, robot
@@ -19,6 +19,8 @@ from go1_mtl_gym.actuation import ActionMap, PDGains
 from go1_mtl_gym.sensing.observation import SensorNoise
 from go1_mtl_gym.sensing.state_noise import EstimatorNoise
 from go1_mtl_gym.sim.domain_randomization import DomainRandomization
+from trainers.data.operator_plan import RELEASED, draw_plan
+from trainers.evaluation.conditions import UNTOUCHED
 from trainers.pipeline.new_policy import new_policy
 
 HOME = ActionMap.for_gains(PDGains()).from_radians(robot.HOME_POSE)
@@ -202,6 +204,60 @@ def test_episodes_are_counted():
     first = trainers.ClosedLoopResult("trot", 1.0, (episode(False, True, 0.1), episode(False, False, 0.3)))
     second = trainers.ClosedLoopResult("walk", 2.0, (episode(True, False, float("nan")), episode(False, True, 0.2)))
     assert counts(first, second) == {"trials": 4, "survived": 3, "succeeded": 2, "velocity_error": pytest.approx(0.2)}
+
+
+# -- Hands -------------------------------------------------------------------------------------------------------------
+
+
+def test_every_condition_has_hands_that_press_no_button():
+    operators = hands.Hands(hands.Hands.full).operators
+    assert [*operators] == [*(f"stick to {d}" for d in ("0.25", "0.5", "0.75", "1", "1.2", "1.5")), *hands.OTHERS]
+    assert [each.deflection for each in operators.values()] == [0.25, 0.5, 0.75, 1.0, 1.2, 1.5, 1.0, 1.0]
+    assert {each.task_interval for each in operators.values()} == {None}
+    assert operators[hands.STANDING] is UNTOUCHED
+
+
+def test_the_fastest_command_ends_at_the_limit():
+    assert hands.speeds("walk", 0.5) == {"fastest": pytest.approx(0.3), "declared": 0.6}
+    assert hands.speeds("trot", 1.5)["fastest"] == pytest.approx(1.95)
+    assert hands.speeds("trot", 3.0) == {"fastest": 2.0, "declared": 1.3}
+
+
+def test_hands_let_go_every_few_seconds_and_mostly_at_full_deflection():
+    seconds = 4000.0
+    plan = draw_plan(hands.BRAKING, "trot", ("trot", "walk"), seconds, np.random.default_rng(0))
+    let_go = [each for each in plan.segments if each.after == RELEASED != each.before]
+    assert seconds / len(let_go) == pytest.approx(5.0, abs=0.3)
+    assert np.mean([max(map(abs, each.before)) == 1.0 for each in let_go]) == pytest.approx(0.92, abs=0.03)
+    assert {each.move for each in plan.segments} == {"straight", "full_and_back", "release"}
+
+
+def test_a_stand_survives_untouched_and_does_not_follow_the_stick():
+    study = hands.Hands(hands.HandsOptions(2, 4.0, 3.0, (1.0,)))
+    standing, reaching = (study.measure(STANDING, Cell("trot", name), 0) for name in ("standing", "stick to 1"))
+    assert (standing["trials"], standing["survived"]) == (2, 2) and "fastest" not in standing
+    assert reaching["succeeded"] == 0 and (reaching["fastest"], reaching["declared"]) == (1.3, 1.3)
+
+
+def test_counts_are_tabled_by_gait_and_success_is_drawn_over_speed():
+    def record(agent, condition, succeeded, **values):
+        own = {"agent": agent, "condition": condition, "trials": 12, "survived": 12, "succeeded": succeeded}
+        return own | values
+
+    records = []
+    for agent in (STUDENT, EXPERT):
+        records += [record(agent, "stick to 0.5", 12, fastest=0.65, declared=1.3), record(agent, hands.STANDING, 3)]
+        records += [record(agent, "stick to 1.5", 6, fastest=1.95, declared=1.3), record(agent, hands.LETTING_GO, 11)]
+    records.append(record(STUDENT, "stick to 0.5", 9, task="walk", fastest=0.3, declared=0.6))
+    found, study = results(records), hands.Hands(hands.Hands.full)
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in study.table(found).splitlines()]
+    assert rows[0][2:] == ["declared [m/s]", "stick to 0.5", "standing", "stick to 1.5", "letting go"]
+    assert rows[2] == ["trot", STUDENT, "1.3", "12/12", "12/12", "6/12", "11/12"]
+    assert [row[:2] for row in rows[2:]] == [["trot", STUDENT], ["trot", EXPERT], ["walk", STUDENT]]
+    trot, walk, _ = (*study.figure(found).axes, None)
+    assert [trot.get_title(), walk.get_title()] == ["trot", "walk"]
+    lines = {line.get_label(): line.get_xydata().tolist() for line in trot.get_lines()}
+    assert lines[STUDENT] == [[0.65, 1.0], [1.95, 0.5]] and lines["declared range"] == [[1.3, 0.0], [1.3, 1.0]]
 
 
 # -- Commands over seeds, and variants ---------------------------------------------------------------------------------

@@ -144,6 +144,32 @@ def test_tours_begin_in_every_gait_and_are_judged_by_survival():
     assert starts == list(PAPER_TASKS)
 
 
+def test_nobody_touches_the_stick_of_a_robot_that_is_to_stand():
+    seen = []
+
+    class Nervous(Stepping):
+        """Makes a step whenever it is told to stand."""
+
+        def changed(self, action, obs):
+            seen.append(obs[34:37])
+            action[THIGHS] = 0.9 * np.sin(2 * np.pi * len(seen) / 40)
+            return action
+
+    cell = certify(Nervous(), conditions=("standing",), episodes=3, **SHORT | {"tasks": ("trot",)}).cells[0]
+    assert cell.outcomes == "uuu" and cell.passed == 3 and cell.failures == (), "a step is no fall"
+    assert not np.any(seen) and cell.plan.claim == 0.99
+    assert CONDITIONS["standing"].operator.push_interval == 10.0
+    assert [*CONDITIONS][:3] == ["operator", "drawn", "standing"]
+
+
+def test_the_page_says_what_is_judged_by_survival():
+    certificate = certify(Stepping(), conditions=("standing", "drawn", "tour"), episodes=1, tours=1, **SHORT)
+    page = certificate.markdown()
+    assert "Judged by survival: nobody touches the stick, tours of all gaits." in page
+    alone = certify(Stepping(), conditions=("drawn",), episodes=1, **SHORT)
+    assert "Judged by survival" not in alone.markdown()
+
+
 def test_a_world_is_a_line_and_reaches_the_environment():
     seen = []
 

@@ -15,6 +15,14 @@ def opened(task="trot", config=None, **env_kwargs):
     return OperatorWrapper(trainers.make_env(task, **env_kwargs), config or OperatorConfig())
 
 
+def test_hands_can_be_left_few_moves():
+    config = OperatorConfig(release=2.0, deflection=0.5).of_moves("release", "jerk")
+    assert config.weights.tolist() == [0, 0, 0, 0, 0, 0, 0, 1.0, 2.0, 0] and config.deflection == 0.5
+    for wrong, message in ((("hop",), "move"), ((), "at least one move")):
+        with pytest.raises(InvalidInputError, match=message):
+            config.of_moves(*wrong)
+
+
 # -- Settings ----------------------------------------------------------------------------------------------------------
 
 

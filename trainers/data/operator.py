@@ -6,11 +6,12 @@ moves of a stick in [-1, 1]^3, a share of the present task's `command_range`, of
 
 import dataclasses
 import functools
+from typing import Any
 
 import numpy as np
 
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.validation import interval_s, number_in
+from go1_mtl_gym.validation import interval_s, number_in, one_of
 
 MOVES = (
     "hold", "straight", "sideways", "turn", "corner", "full_and_back", "ramp", "jerk", "release", "stand"
@@ -97,3 +98,13 @@ class OperatorConfig:
     def of_one_gait(self) -> "OperatorConfig":
         """The same hands without the buttons."""
         return dataclasses.replace(self, task_interval=None)
+
+    def of_moves(self, *moves: str) -> "OperatorConfig":
+        """The same hands with these moves alone, each of its weight.
+
+        Raises:
+            InvalidInputError: if one is none of `MOVES`, or none has a weight.
+        """
+        kept = {one_of(move, MOVES, "move") for move in moves}
+        others: dict[str, Any] = dict.fromkeys(set(MOVES) - kept, 0.0)
+        return dataclasses.replace(self, **others)

@@ -64,7 +64,7 @@ def _matrix(cells: Sequence[Cell]) -> str:
 
     rows = [[title, *(short(title, gait) for gait in gaits)] for title in _distinct(title for title, _ in named)]
     table = markdown(["condition", *gaits], rows)
-    return f"{table}\n\nSuccessful episodes (of tours: survived ones) of all; bold where the claim is not met."
+    return f"{table}\n\nSuccessful episodes of all, or survived ones where that is the claim; bold where it is not met."
 
 
 def _cells(cells: Sequence[Cell]) -> str:
@@ -129,12 +129,14 @@ def _method(settings: Settings, versions: Mapping[str, str], cells: Sequence[Cel
     plans = {cell.plan: None for cell in cells}
     looks = [f"- {_in_words(plan)}" for plan in plans if plan.looks]
     ends = "Episodes end when the answer is known. " if settings.stop_early else "No episode was left out. "
+    survivors = _distinct(cell.condition.title for cell in cells if cell.condition.judged_by == "survival")
+    survival = f"Judged by survival: {', '.join(survivors)}. " if survivors else ""
     arguments = ", ".join(f"{name} {value}" for name, value in settings.env_kwargs.items()) or "as the policy has it"
     packages = ", ".join(f"{name} {version}" for name, version in versions.items())
     return "\n".join(
         [
             f"Episodes of {settings.seconds:g} s, tours of {settings.tour_seconds:g} s; seed {settings.seed}. Success: "
-            "survived, velocity error at most 0.15 m/s, and stepped at the gait's rate. Tours are judged by survival. "
+            f"survived, velocity error at most 0.15 m/s, and stepped at the gait's rate. {survival}"
             f"{ends}Confidence {settings.confidence:.0%}.",
             "",
             *looks,

@@ -22,6 +22,8 @@ DRAWN_CLAIM = 0.90
 """The same where everything is drawn at once from the ranges of `DomainRandomization`."""
 TOUR_CLAIM = 0.9704
 """What 100 tours without a fall show at 95 %: the 100th root of 5 %, rounded down."""
+UNTOUCHED = OperatorConfig(starts_released=1.0).of_moves("release", "stand").of_one_gait()
+"""A stick that nobody touches; a push comes now and then, as it does to every operator."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -92,6 +94,8 @@ CONDITIONS = {
     for each in (
         Condition("operator", "operator"),
         Condition("drawn", "drawn commands", operator=None),
+        # A robot that is pushed steps to keep its balance, which success would not allow it.
+        Condition("standing", "nobody touches the stick", UNTOUCHED, judged_by="survival"),
         world("delay", "delay 20 ms", action_delay_s=0.02),
         world("payload", "payload 3 kg", payload_kg=3.0),
         world("friction", "friction 0.4", friction=0.4),
