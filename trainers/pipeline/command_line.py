@@ -54,6 +54,6 @@ def job_parser() -> argparse.ArgumentParser:
         default=None,
         help="parts of the observation; the preset's if not given",
     )
-    add("--history", type=int, default=1, help="proprioceptive frames in the observation")
+    add("--history", type=int, default=None, help="proprioceptive frames in the observation; the preset's if not given")
     add("--control-hz", type=int, default=None, help="rate of the policy; the preset's if not given")
     return parser
