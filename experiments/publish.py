@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import trainers
 from experiments import main_job
 from experiments.catalog import STUDIES, resolve, study_class
 from experiments.plots import save_figure
@@ -24,8 +25,12 @@ SUMMARY = ("<!-- results:summary -->", "<!-- /results:summary -->")
 GENERATED = "<!-- Written by `python -m experiments publish` from the files beside it; do not edit. -->"
 COPIED = ("joint_targets.png", "gaits.gif")
 """Files of a run that are published as they are."""
+FILM = "hero.webp"
+"""A policy of the package on a tour through its gaits, made anew with every `SHIPPED_PRESET` run."""
 POLICIES = {"policy.zip": "clocked.zip", "phase_free.zip": "phase_free.zip"}
 """Policies of a run, and their names in ``trainers/assets/``, from where `trainers.load_pretrained` reads them."""
+FILMED = "policy.zip"
+"""The one that `FILM` shows."""
 PUBLISHED_PRESET, SHIPPED_PRESET = "default", "shipped"
 """Of the run whose metrics are published, and of the one whose policies come with the package."""
 CERTIFICATES = "certificate_*.json"
@@ -160,7 +165,8 @@ def texts(root: Path) -> dict[Path, str]:
 def copy_run(run: Path, root: Path) -> None:
     """Copy what is published of a run; the output folder, which only its machine knows, is cut from the command.
 
-    Of a run of the preset "default" these are the metrics and pictures, of one of "shipped" the policies.
+    Of a run of the preset "default" these are the metrics and pictures, of one of "shipped" the policies, of which a
+    film is made.
 
     Args:
         run: output folder of the main job.
@@ -169,6 +175,7 @@ def copy_run(run: Path, root: Path) -> None:
     Raises:
         InvalidInputError: if files are missing (all are named), the metrics cannot be read, or the run is of neither
             preset.
+        go1_mtl_gym.rendering.RenderingError: if the film cannot be drawn on this machine.
     """
     metrics = read_json(run / "metrics.json") if (run / "metrics.json").is_file() else {}
     preset = metrics.get("config", {}).get("preset")
@@ -183,6 +190,7 @@ def copy_run(run: Path, root: Path) -> None:
         _copy_results(run, metrics, root / "docs" / "results")
     elif preset == SHIPPED_PRESET:
         assets = root / "trainers" / "assets"
+        film(run / FILMED, root)  # before they are copied: where nothing can be drawn, old policies keep their film
         assets.mkdir(parents=True, exist_ok=True)
         for name, published in POLICIES.items():
             shutil.copyfile(run / name, assets / published)
@@ -190,6 +198,19 @@ def copy_run(run: Path, root: Path) -> None:
         raise InvalidInputError(
             f"a run of the preset {PUBLISHED_PRESET!r} or {SHIPPED_PRESET!r} was expected, {run} is one of {preset!r}"
         )
+
+
+def film(policy: Path, root: Path) -> None:
+    """Drive a policy through `trainers.save_tour`, for the pages that show it; some minutes on software OpenGL.
+
+    Args:
+        policy: its file.
+        root: of the checkout.
+
+    Raises:
+        go1_mtl_gym.rendering.RenderingError: if no picture can be drawn on this machine.
+    """
+    trainers.save_tour(trainers.load(policy), root / "docs" / "results" / FILM)
 
 
 def _copy_results(run: Path, metrics: dict[str, Any], folder: Path) -> None:
@@ -209,6 +230,7 @@ def publish_command(arguments: list[str], root: Path = ROOT) -> None:
     parser = argparse.ArgumentParser(prog="python -m experiments publish", description=about)
     parser.add_argument("run", type=Path, nargs="?", help="output folder of a finished main job, copied first")
     parser.add_argument("--check", action="store_true", help="change nothing; fail if something is out of date")
+    parser.add_argument("--film", action="store_true", help=f"make {FILM} anew, of the policy in the package")
     parser.add_argument("--draw", nargs="+", default=[], choices=tuple(STUDIES), help="redraw the pictures of studies")
     options = parser.parse_args(arguments)
     for name in options.draw:
@@ -216,6 +238,8 @@ def publish_command(arguments: list[str], root: Path = ROOT) -> None:
     texts(root)  # a README without markers is an error before anything is copied
     if options.run is not None and not options.check:
         copy_run(options.run, root)
+    if options.film and not options.check:
+        film(root / "trainers" / "assets" / POLICIES[FILMED], root)
     wanted = texts(root)
     stale = [path for path, text in wanted.items() if not path.is_file() or path.read_text(encoding="utf-8") != text]
     names = ", ".join(str(path.relative_to(root)) for path in stale)

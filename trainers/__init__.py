@@ -36,7 +36,9 @@ if TYPE_CHECKING:
     from trainers.evaluation.metrics import offline_metrics
     from trainers.evaluation.replay import replay
     from trainers.evaluation.scoring import ClosedLoopResult, EpisodeRecord
-    from trainers.evaluation.video import record_frames, save_gif, tile
+    from trainers.evaluation.script import Move, Script
+    from trainers.evaluation.tour import film_tour, save_tour
+    from trainers.evaluation.video import record_frames, save_gif, save_webp, tile
     from trainers.pipeline.config import JobConfig
     from trainers.pipeline.job import Job
     from trainers.policies.checkpoint import CheckpointError
@@ -67,6 +69,7 @@ _HOME = {
     "Job": "pipeline.job",
     "JobConfig": "pipeline.config",
     "Learner": "data.stateful",
+    "Move": "evaluation.script",
     "MultiHeadPolicy": "policies.multi_head",
     "MultiTaskLoss": "algorithms.losses",
     "OperatorConfig": "data.operator",
@@ -75,6 +78,7 @@ _HOME = {
     "PhaseConfig": "algorithms.phase_free",
     "PhaseEstimator": "policies.phase_estimator",
     "PhaseFreePolicy": "policies.phase_free",
+    "Script": "evaluation.script",
     "ShardMismatchError": "data.collection",
     "TensorBatches": "data.batches",
     "certify": "evaluation.certify",
@@ -84,6 +88,7 @@ _HOME = {
     "draw_plan": "data.operator_plan",
     "evaluate": "evaluation.closed_loop",
     "evaluate_transition": "evaluation.gait_transitions",
+    "film_tour": "evaluation.tour",
     "joint_target_figure": "evaluation.figures",
     "learn_task": "algorithms.add_task",
     "load": "policies.loading",
@@ -103,6 +108,8 @@ _HOME = {
     "replay": "evaluation.replay",
     "results_table": "utils.report",
     "save_gif": "evaluation.video",
+    "save_tour": "evaluation.tour",
+    "save_webp": "evaluation.video",
     "tile": "evaluation.video",
     "train_bc": "algorithms.bc",
     "train_phase": "algorithms.phase_free",

@@ -13,6 +13,7 @@ from experiments.main_job import results_of
 from experiments.publish import copy_run, publish_command, summarized
 from experiments.results import Results, without_folders
 from go1_mtl_gym import InvalidInputError
+from go1_mtl_gym.rendering import RenderingError
 from tests.experiments.published import FOLDER
 
 README = "# A title\n\n<!-- results:summary -->\nold\n<!-- /results:summary -->\n\nThe end.\n"
@@ -72,12 +73,43 @@ def test_a_run_becomes_records_a_page_and_the_summary(run, root):
         publish_command(["--check"], root)
 
 
-def test_a_run_for_the_package_becomes_its_policies(run, root):
+@pytest.fixture
+def filmed(monkeypatch) -> list:
+    """Takes the place of the camera: (policy, file) of each film that was asked for."""
+    films = []
+    monkeypatch.setattr(trainers, "load", lambda path: Path(path).read_bytes())
+    monkeypatch.setattr(trainers, "save_tour", lambda policy, path: films.append((policy, path)))
+    return films
+
+
+def test_a_run_for_the_package_becomes_its_policies_and_their_film(run, root, filmed):
     (run / "metrics.json").write_text(json.dumps(metrics(config={"preset": "shipped"})))
     publish_command([str(run)], root)
+    assert filmed == [(b"policy.zip", root / "docs" / "results" / "hero.webp")]
     assert (root / "trainers" / "assets" / "clocked.zip").read_bytes() == b"policy.zip"
     assert (root / "trainers" / "assets" / "phase_free.zip").read_bytes() == b"phase_free.zip"
     assert not (root / "docs" / "results" / "main_job.json").exists()
+
+
+def test_the_film_can_be_made_anew(root, filmed):
+    assets = root / "trainers" / "assets"
+    assets.mkdir(parents=True)
+    (assets / "clocked.zip").write_bytes(b"in the package")
+    publish_command(["--film", "--check"], root)
+    assert not filmed
+    publish_command(["--film"], root)
+    assert filmed == [(b"in the package", root / "docs" / "results" / "hero.webp")]
+
+
+def test_where_no_film_can_be_made_the_old_policies_stay(run, root, filmed, monkeypatch):
+    def fail(policy, path):
+        raise RenderingError("no OpenGL")
+
+    monkeypatch.setattr(trainers, "save_tour", fail)
+    (run / "metrics.json").write_text(json.dumps(metrics(config={"preset": "shipped"})))
+    with pytest.raises(RenderingError):
+        publish_command([str(run)], root)
+    assert not (root / "trainers").exists()
 
 
 def test_certificates_get_their_page(root):

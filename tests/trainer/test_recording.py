@@ -10,7 +10,7 @@ from PIL import Image
 
 from go1_mtl_gym import robot
 from go1_mtl_gym.errors import InvalidInputError
-from trainers import record_frames, save_gif, tile
+from trainers import record_frames, save_gif, save_webp, tile
 
 
 def film(value: int, count: int = 3, height: int = 48, width: int = 64) -> np.ndarray:
@@ -95,6 +95,30 @@ def test_a_gif_of_one_frame_is_a_picture(tmp_path):
 def test_a_gif_of_something_else_is_refused(tmp_path, fps, frames):
     with pytest.raises(InvalidInputError, match="fps must|frames must"):
         save_gif(frames, tmp_path / "x.gif", fps)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_webp_reads_back_and_its_rounded_durations_add_up(tmp_path):
+    frames = film(30, count=6)
+    for i, frame in enumerate(frames):
+        frame[8:24, 8 * i : 8 * i + 16] = [250, 140, 25]
+    save_webp(frames, tmp_path / "new" / "walk.webp", fps=30, quality=90)
+    assert [path.name for path in (tmp_path / "new").iterdir()] == ["walk.webp"]
+    with Image.open(tmp_path / "new" / "walk.webp") as webp:
+        assert webp.n_frames == 6 and webp.size == (64, 48) and webp.info["loop"] == 0
+        durations = []
+        for i in range(6):
+            webp.seek(i)
+            again = np.asarray(webp.convert("RGB")).astype(int)
+            durations.append(webp.info["duration"])
+    assert durations == [33, 34, 33, 33, 34, 33]
+    assert np.abs(again - frames[5]).mean() < 5
+
+
+@pytest.mark.parametrize("wrong", [{"fps": 0}, {"fps": 60}, {"quality": 101}, {"quality": "best"}])
+def test_a_webp_of_something_else_is_refused(tmp_path, wrong):
+    with pytest.raises(InvalidInputError, match="fps must|quality must"):
+        save_webp(film(1), tmp_path / "x.webp", **wrong)
     assert not list(tmp_path.iterdir())
 
 

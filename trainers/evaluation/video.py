@@ -11,6 +11,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from go1_mtl_gym import Go1Env
 from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.validation import integer_in
 from trainers.data.environments import base_env, make_env
 from trainers.evaluation.episodes import EpisodeSetup
 from trainers.evaluation.rollout import checked_agent
@@ -25,6 +26,10 @@ SHADOW_PIXELS = 1024
 """Side of the shadow map; the model's own is finer and slower."""
 MAX_FPS = 50
 """Browsers slow down GIFs that ask for more."""
+WEBP_EFFORT = 4
+"""From 0, fast, to 6, small."""
+KEY_FRAMES = (3, 5)
+"""Fewest and most frames from one whole picture of a WebP to the next."""
 
 
 def record_frames(
@@ -186,6 +191,34 @@ def save_gif(frames: np.ndarray, path: str | PathLike[str], fps: float = 25) -> 
     images = [Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
     how = {"save_all": True, "append_images": images[1:], "duration": 10 * round(100 / fps), "loop": 0}
     write_atomically(path, lambda file: images[0].save(file, format="GIF", optimize=False, **how))
+
+
+def save_webp(frames: np.ndarray, path: str | PathLike[str], fps: float = 25, quality: int = 50) -> None:
+    """Write an endlessly looping WebP: all colors, and a fraction of a GIF's size.
+
+    The file is complete or not there.
+
+    Args:
+        frames: RGB, uint8, shape (n, h, w, 3).
+        path: of the file.
+        fps: frames per second, 1 ... 50.
+        quality: of the pictures, 0 ... 100.
+
+    Raises:
+        InvalidInputError: if an argument is not as described.
+    """
+    frames = _checked(frames, "frames")
+    if not 1 <= fps <= MAX_FPS:
+        raise InvalidInputError(f"fps must be from 1 to {MAX_FPS}, got {fps}")
+    quality = integer_in(quality, 0, 100, "quality")
+    images = [Image.fromarray(frame) for frame in frames]
+    # WebP counts in milliseconds: the ends are rounded, so that rounding does not add up
+    ends = [round(1000 * (i + 1) / fps) for i in range(len(images))]
+    durations = [end - start for start, end in zip([0, *ends], ends, strict=False)]
+    how = {"save_all": True, "append_images": images[1:], "duration": durations, "loop": 0, "quality": quality}
+    # each key frame wipes out what coarse pictures have left behind on the ground
+    keys = {"kmin": KEY_FRAMES[0], "kmax": KEY_FRAMES[1]}
+    write_atomically(path, lambda file: images[0].save(file, format="WEBP", method=WEBP_EFFORT, **how, **keys))
 
 
 def _checked(frames: Any, label: str) -> np.ndarray:
