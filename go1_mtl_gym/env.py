@@ -34,7 +34,7 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
     """A Unitree Go1 that moves in the gait of a task, as told by a command.
 
     Without arguments it is what the policy in the package drives, and what reinforcement learning can learn. With
-    ``channels=()`` it shows the 34 + K numbers of arXiv 2505.08574, which hold neither command nor phase.
+    ``channels=(), history=1`` it shows the 34 + K numbers of arXiv 2505.08574, which hold neither command nor phase.
 
     ## Action space
 

@@ -48,6 +48,20 @@ def test_draws_fill_their_ranges_evenly_and_independently():
     assert np.abs(np.corrcoef(level.T) - np.eye(len(drawn))).max() < 0.1
 
 
+def test_figures_are_drawn_one_by_one_if_asked_to():
+    rare = DomainRandomization(payload_kg=(1.0, 2.0), friction=(0.1, 0.2), each=0.25)
+    drawn = draws(rare, 4000)
+    loaded, slippery = (np.array([getattr(one.physics, name) for one in drawn]) for name in ("payload_kg", "friction"))
+    own = PhysicsParams()
+    with_load, with_slip = loaded != own.payload_kg, slippery != own.friction
+    assert with_load.mean() == pytest.approx(0.25, abs=0.03) and with_slip.mean() == pytest.approx(0.25, abs=0.03)
+    assert (with_load & with_slip).mean() == pytest.approx(0.0625, abs=0.015)
+    assert (loaded[with_load] >= 1.0).all() and loaded[with_load].mean() == pytest.approx(1.5, abs=0.05)
+    assert draws(dataclasses.replace(rare, each=0.0), 3) == [EpisodeConditions()] * 3
+    with pytest.raises(InvalidInputError, match="each.*got 1.5"):
+        DomainRandomization(each=1.5)
+
+
 def test_every_encoder_errs_by_its_own_share_of_a_magnitude_that_is_drawn():
     randomization = DomainRandomization(encoder_offset=(0.02, 0.06))
     offsets = np.array([one.sensors.encoder_offset for one in draws(randomization, 2000)])
@@ -211,7 +225,7 @@ def test_the_noise_of_an_episode_is_forgotten_by_the_next():
 
 
 def test_noise_that_could_become_impossible_is_refused_at_once():
-    with pytest.raises(InvalidInputError, match="sensor noise of gyroscope.*got 12"):
+    with pytest.raises(InvalidInputError, match="sensor noise of gyroscope.*got 16"):
         Go1Env("trot", noise=SensorNoise(gyroscope=8.0), randomization=True)
 
 

@@ -42,7 +42,7 @@ def test_without_arguments_it_is_the_environment_of_the_policy_in_the_package(ta
 
 
 def test_without_channels_it_is_the_papers():
-    env = gymnasium.make("go1_mtl_gym:Go1Walk-v0", channels=(), tasks=PAPER_TASKS)
+    env = gymnasium.make("go1_mtl_gym:Go1Walk-v0", channels=(), history=1, tasks=PAPER_TASKS)
     assert env.observation_space.shape == (34 + 4,)
 
 

@@ -167,7 +167,7 @@ def test_a_correction_back_over_phase_zero_is_no_arrival(policy):
 
 def test_the_real_environments_clock_is_followed_through_a_stand():
     """Driven by the expert; the oracle keeps the clock true, but for the period in which a command begins to ask."""
-    kwargs = {"tasks": ("trot", "walk"), "channels": CHANNELS[:2]}
+    kwargs = {"tasks": ("trot", "walk"), "channels": CHANNELS[:2], "history": 1}
     env = trainers.make_env("trot", **kwargs)
     base = env.unwrapped
     policy = MultiHeadPolicy(env.observation_space, env.action_space, contract=base.contract, width=8, seed=0)

@@ -1,5 +1,6 @@
 """Settings of the main job: what is normalized, what is refused, and what the command line makes of it."""
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -84,7 +85,7 @@ def test_every_shard_has_a_seed_of_its_own_and_shorter_runs_are_the_beginning_of
     assert [job.perturbation is None for job in train] == [True] * 4 + [False] * 12
     assert ["randomization" in job.env_kwargs for job in train] == [False] * 12 + [True] * 4
     pushed_hard = [job.perturbation.operator.hard_push_interval for job in train[4:]]
-    assert pushed_hard == [None] * 6 + [4.0] * 2 + [None] * 4
+    assert pushed_hard == [None] * 6 + [2.5] * 2 + [None] * 4
     assert all(job.perturbation is None for job in held_out)
     less = config.with_options(clean_s=15.0, perturbed_s=0.0, hard_push_s=0.0, randomized_s=0.0)
     assert training_jobs(less) == train[:2]
@@ -97,18 +98,24 @@ def test_what_follows_for_the_stages():
     assert config.bc.steps == 600 and config.round_bc.steps == 100 and config.baseline_bc.steps == 600 + 3 * 100
     assert {config.bc.seed, config.dagger.seed, config.phase.seed} == {5}
     assert config.has_clock and not config.is_literal
-    assert not config.with_options(history=2).has_clock
-    assert config.with_options(channels=()).is_literal
+    assert not config.with_options(channels=("command",)).has_clock
+    with pytest.raises(InvalidInputError, match="reads its 3 frames and more, got phase_free_history = 2"):
+        config.with_options(phase_free_history=2)
+    assert config.with_options(channels=(), history=1).is_literal
     assert config.perturbation(0.05).task_interval == (2.0, 6.0)
-    assert config.perturbation(0.05).operator == config.operator and config.operator.task_interval is not None
+    assert config.operator.task_interval is not None
+    assert config.perturbation(0.05).operator == dataclasses.replace(config.operator, deflection=1.2)
+    assert config.with_options(margin=1.0).perturbation(0.05).operator == config.operator
     alone = config.with_options(tasks=("trot",)).perturbation(0.05)
     assert alone.task_interval is alone.operator.task_interval is None, "one gait cannot change"
     assert config.with_options(operator=None).perturbation(0.05, 4.0).operator is None
-    assert config.round_perturbation.operator.hard_push_interval == 8.0
+    assert config.round_perturbation.operator.hard_push_interval == 5.0
     gentle = config.with_options(hard_push_interval=None)
     assert gentle.round_perturbation.operator.hard_push_interval is None
     assert len(training_jobs(config)) - len(training_jobs(gentle)) == 6 * 6
     assert config.randomization_kwargs(0.3)["randomization"].fraction == 0.3
+    assert config.randomization_kwargs(0.3)["randomization"].each == 0.5
+    assert config.randomization_kwargs(0.3)["episode_s"] == config.world_s == 5.0
     assert config.randomization_kwargs(0.0) == {}
     assert config.bc.mirror and not config.with_options(mirror=False).bc.mirror
 

@@ -11,7 +11,7 @@ from trainers.pipeline.run_folder import RunFolder
 
 TINY = JobConfig.from_preset(
     "smoke", tasks=("trot",), rounds=0, n_envs=1, clean_s=1.0, perturbed_s=0, held_out_s=1.0, shard_s=1.0, width=8,
-    clone_steps=5, phase_free_s=0, episodes=1, episode_s=0.5, channels=(),
+    clone_steps=5, phase_free_s=0, episodes=1, episode_s=0.5, channels=(), history=1,
 )  # fmt: skip
 
 

@@ -107,7 +107,7 @@ class JobConfig:
     randomized_s: float = _from(0, 90.0)
     operator: OperatorConfig | None = OperatorConfig()
     margin: float = _from(0, 1.2, above=True)
-    hard_push_interval: float | None = _from(0, 4.0, above=True)
+    hard_push_interval: float | None = _from(0, 2.5, above=True)
     held_out_s: float = _from(0, 60.0, above=True)
     randomized: float = _from(0, 0.3)
     world_s: float = _from(0, 5.0, above=True)
@@ -145,6 +145,11 @@ class JobConfig:
             object.__setattr__(self, "operator", OperatorConfig(**self.operator))
         for name in ("randomized", "corner_fraction"):
             number_in(getattr(self, name), 0.0, 1.0, name)
+        if self.phase_free_s and self.has_clock and self.phase_free_history < self.history:
+            raise InvalidInputError(
+                f"without a clock the policy reads its {self.history} frames and more, got phase_free_history = "
+                f"{self.phase_free_history}"
+            )
         if min(self.shards(self.clean_s) + self.shards(self.perturbed_s), self.shards(self.held_out_s)) < 1:
             raise InvalidInputError(
                 f"clean_s + perturbed_s and held_out_s must each fill a shard of shard_s = {self.shard_s:g} s, "
@@ -239,7 +244,7 @@ class JobConfig:
     @property
     def has_clock(self) -> bool:
         """Whether the policy sees a gait clock and a command, and so can do without the clock later."""
-        return {"command", "phase"} <= set(self.channels) and self.history == 1
+        return {"command", "phase"} <= set(self.channels)
 
     @property
     def bc(self) -> BCConfig:

@@ -31,7 +31,6 @@ PRESETS: dict[str, dict[str, Any]] = {
         "clean_s": 30.0,
         "perturbed_s": 300.0,
         "hard_push_s": 750.0,
-        "hard_push_interval": 2.5,
         "randomized_s": 750.0,
         "randomized": 0.5,
         "held_out_s": 30.0,
