@@ -7,7 +7,6 @@ import argparse
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import trainers
 from experiments import main_job
@@ -33,6 +32,8 @@ FILMED = "policy.zip"
 """The one that `FILM` shows."""
 PUBLISHED_PRESET, SHIPPED_PRESET = "default", "shipped"
 """Of the run whose metrics are published, and of the one whose policies come with the package."""
+SETTINGS = "config.json"
+"""File of a run that says what its settings are."""
 CERTIFICATES = "certificate_*.json"
 """What `trainers.certify` found out about the policies that come with the package."""
 
@@ -166,7 +167,7 @@ def copy_run(run: Path, root: Path) -> None:
     """Copy what is published of a run; the output folder, which only its machine knows, is cut from the command.
 
     Of a run of the preset "default" these are the metrics and pictures, of one of "shipped" the policies, of which a
-    film is made.
+    film is made; those need not have been evaluated yet, which certificates do.
 
     Args:
         run: output folder of the main job.
@@ -177,17 +178,17 @@ def copy_run(run: Path, root: Path) -> None:
             preset.
         go1_mtl_gym.rendering.RenderingError: if the film cannot be drawn on this machine.
     """
-    metrics = read_json(run / "metrics.json") if (run / "metrics.json").is_file() else {}
-    preset = metrics.get("config", {}).get("preset")
-    wanted = {PUBLISHED_PRESET: COPIED, SHIPPED_PRESET: tuple(POLICIES)}.get(preset, (*COPIED, *POLICIES))
-    missing = [name for name in ("metrics.json", *wanted) if not (run / name).is_file()]
+    preset = read_json(run / SETTINGS).get("preset") if (run / SETTINGS).is_file() else None
+    measured = ("metrics.json", *COPIED)
+    wanted = {PUBLISHED_PRESET: measured, SHIPPED_PRESET: tuple(POLICIES)}.get(str(preset), (*measured, *POLICIES))
+    missing = [name for name in (SETTINGS, *wanted) if not (run / name).is_file()]
     if missing:
         raise InvalidInputError(
             f"{run} lacks {', '.join(missing)}; expected the --out folder of a finished main job"
             + (" (gaits.gif needs OpenGL)" if "gaits.gif" in missing else "")
         )
     if preset == PUBLISHED_PRESET:
-        _copy_results(run, metrics, root / "docs" / "results")
+        _copy_results(run, root / "docs" / "results")
     elif preset == SHIPPED_PRESET:
         assets = root / "trainers" / "assets"
         film(run / FILMED, root)  # before they are copied: where nothing can be drawn, old policies keep their film
@@ -213,7 +214,8 @@ def film(policy: Path, root: Path) -> None:
     trainers.save_tour(trainers.load(policy), root / "docs" / "results" / FILM)
 
 
-def _copy_results(run: Path, metrics: dict[str, Any], folder: Path) -> None:
+def _copy_results(run: Path, folder: Path) -> None:
+    metrics = read_json(run / "metrics.json")
     results = main_job.results_of(metrics, without_folders(metrics.get("command", "")))
     results.write(folder / f"{main_job.NAME}.json")
     for name in COPIED:

@@ -34,6 +34,7 @@ def run(tmp_path) -> Path:
     folder = tmp_path / "run"
     folder.mkdir()
     (folder / "metrics.json").write_text(json.dumps(metrics()))
+    (folder / "config.json").write_text(json.dumps({"preset": "default"}))
     for name in (*publish.COPIED, *publish.POLICIES):
         (folder / name).write_bytes(name.encode())
     return folder
@@ -83,7 +84,8 @@ def filmed(monkeypatch) -> list:
 
 
 def test_a_run_for_the_package_becomes_its_policies_and_their_film(run, root, filmed):
-    (run / "metrics.json").write_text(json.dumps(metrics(config={"preset": "shipped"})))
+    (run / "config.json").write_text(json.dumps({"preset": "shipped"}))
+    (run / "metrics.json").unlink()  # certificates measure these policies
     publish_command([str(run)], root)
     assert filmed == [(b"policy.zip", root / "docs" / "results" / "hero.webp")]
     assert (root / "trainers" / "assets" / "clocked.zip").read_bytes() == b"policy.zip"
@@ -106,7 +108,8 @@ def test_where_no_film_can_be_made_the_old_policies_stay(run, root, filmed, monk
         raise RenderingError("no OpenGL")
 
     monkeypatch.setattr(trainers, "save_tour", fail)
-    (run / "metrics.json").write_text(json.dumps(metrics(config={"preset": "shipped"})))
+    (run / "config.json").write_text(json.dumps({"preset": "shipped"}))
+    (run / "metrics.json").unlink()  # certificates measure these policies
     with pytest.raises(RenderingError):
         publish_command([str(run)], root)
     assert not (root / "trainers").exists()
@@ -130,7 +133,7 @@ def test_a_missing_file_is_named_before_anything_is_copied(run, root, name):
 
 
 def test_other_runs_are_refused(run, root):
-    (run / "metrics.json").write_text(json.dumps(metrics(config={"preset": "smoke"})))
+    (run / "config.json").write_text(json.dumps({"preset": "smoke"}))
     with pytest.raises(InvalidInputError, match="'smoke'"):
         copy_run(run, root)
     with pytest.raises(InvalidInputError, match="metrics of a finished run"):
