@@ -25,7 +25,7 @@ from experiments.student.transitions import TransitionOptions
 from experiments.study import ALL_GAITS, Cell, Metrics, Study, option
 from experiments.tables import mean, share, table
 from experiments.training_runs import QUICK_JOB, collect, kept_policy, rows_of
-from go1_mtl_gym.env_config import DEFAULT_CHANNELS
+from go1_mtl_gym.env_config import DEFAULT_CHANNELS, DEFAULT_HISTORY
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.sensing.observation import ObservationLayout, SensorNoise
 from go1_mtl_gym.validation import one_of
@@ -66,7 +66,7 @@ VARIANTS = {
     "ten frames, phase asked for": Variant(FELT, FRAMES, asked=True),
     "two stages": Variant(FELT, FRAMES, correction=1.0),
     "two stages, clock with correction": Variant(FELT, FRAMES, correction=0.2),
-    "clock": Variant(CLOCKED),
+    "clock": Variant(CLOCKED, DEFAULT_HISTORY),
 }
 """Everything that is trained here, by name; the last is the bound."""
 
