@@ -36,7 +36,10 @@ def parts(env: Go1Env, observation: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def test_an_offset_is_added_to_the_joint_positions_and_to_nothing_else():
-    env, plain = Go1Env(channels=CHANNELS, sensors=SensorParams(OFFSETS)), Go1Env(channels=CHANNELS)
+    env, plain = (
+        Go1Env(channels=CHANNELS, history=1, sensors=SensorParams(OFFSETS)),
+        Go1Env(channels=CHANNELS, history=1),
+    )
     for seen, exact in zip(walk(env), walk(plain)):
         seen, exact = parts(env, seen), parts(plain, exact)
         np.testing.assert_allclose(seen["q"] - exact["q"], OFFSETS, atol=1e-6)
@@ -97,7 +100,8 @@ def test_a_late_reading_is_that_of_the_millisecond_it_was_taken_in(late_ms, cont
 
 
 def test_a_delay_shows_in_readings_alone_and_leaves_the_physics_as_they_are_to_the_bit():
-    env, plain = Go1Env(channels=CHANNELS, sensors=SensorParams(delay_s=0.013)), Go1Env(channels=CHANNELS)
+    env = Go1Env(channels=CHANNELS, history=1, sensors=SensorParams(delay_s=0.013))
+    plain = Go1Env(channels=CHANNELS, history=1)
     differ = set()
     for late, exact in zip(walk(env), walk(plain)):
         late, exact = parts(env, late), parts(plain, exact)
