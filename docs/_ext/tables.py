@@ -39,6 +39,7 @@ CONTENT = {
     "phase": "sine and cosine of the gait clock",
     "last_action": "the action of the last step",
     "leg_kinematics": "feet, 4 x 3, and what each says of the trunk's velocity if it stands still, 4 x 3; trunk frame",
+    "history": "the first 34 numbers of the frames before this one, newest first",
     "task": "one-hot task id, in the order of `tasks`",
 }
 """What the parts of an observation hold."""
@@ -51,6 +52,8 @@ SETTINGS = {
     "hard_push_s": "perturbed and pushed hard, per gait [s]",
     "randomized_s": "perturbed, with drawn physics and sensors, per gait [s]",
     "operator": "an [operator](#the-operator) in perturbed ones, rounds and evaluation",
+    "world_s": "length of the episodes in which they are drawn [s]",
+    "margin": "reach of the operator in demonstrations and rounds, as a multiple of the evaluated one",
     "hard_push_interval": "mean time between hard pushes in `hard_push_s` [s]",
     "held_out_s": "held-out demonstrations per gait [s]",
     "mirror": "rows in the mirror as well",
@@ -147,6 +150,7 @@ def _layout_table(layout: ObservationLayout) -> str:
         low, high = layout.low[where], layout.high[where]
         largest = ", ".join(f"{value:.4g}" for value in sorted(set(high.tolist()), reverse=True))
         bounds = f"± {largest}" if (low == -high).all() else f"0 ... {largest}"
+        bounds = "as of those" if name == "history" else bounds
         rows.append((f"`{name}`", span, size, _unit(name), bounds, CONTENT[name]))
     return markdown(("part", "slice", "size", "unit", "bounds", "content"), rows)
 

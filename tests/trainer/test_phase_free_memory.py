@@ -126,7 +126,7 @@ def test_what_was_refused_is_not_remembered(phase_free):
 
 def test_a_change_out_of_a_jump_begins_the_clock_when_the_environment_does():
     """The environment waits for the middle of the stance; until then the task id and the clock are the jump's."""
-    env = trainers.make_env("jump", tasks=("jump", "trot"), channels=("command", "phase"))
+    env = trainers.make_env("jump", tasks=("jump", "trot"), channels=("command", "phase"), history=1)
     base = env.unwrapped
     policy = MultiHeadPolicy(env.observation_space, env.action_space, contract=base.contract, width=8, seed=0)
     phase_free = oracle(policy, lambda: info["phase"], 0.3, history=1)

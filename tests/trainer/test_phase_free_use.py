@@ -173,9 +173,9 @@ def test_an_estimator_of_something_else(policy, tasks, channels, message):
 @pytest.mark.parametrize(
     ("kwargs", "message"),
     [
-        ({"channels": ("command", "last_action")}, "must see command, phase"),
-        ({"channels": ("phase",)}, "must see command, phase"),
-        ({"history": 2}, "one frame"),
+        ({"channels": ("command", "last_action")}, "must see command and phase"),
+        ({"channels": ("phase",)}, "must see command and phase"),
+        ({"history": 2}, "at least the student's 2 frames, got 1"),
     ],
 )
 def test_a_policy_that_sees_something_else(kwargs, message):

@@ -87,8 +87,7 @@ def series(n: int = 100) -> Series:
     measured = np.zeros((n, 3))
     measured[:, 0] = np.arange(n) / 100
     tasks = ("trot",) * (n // 2) + ("walk",) * (n - n // 2)
-    gaits = tuple(TASKS[name].gait for name in tasks)
-    return Series(measured, 2 * measured, contacts, np.ones(n, dtype=bool), gaits, 3 * measured, tasks)
+    return Series(measured, 2 * measured, contacts, np.ones(n, dtype=bool), 3 * measured, tasks)
 
 
 def test_captions_say_what_was_measured_until_then():
