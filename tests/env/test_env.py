@@ -38,7 +38,7 @@ def test_without_arguments_it_is_the_environment_of_the_policy_in_the_package(ta
     drives = BUILT_IN_TASKS if task in (None, *BUILT_IN_TASKS) else (*BUILT_IN_TASKS, task)
     assert env.tasks == drives and env.layout.channels == ("command", "phase", "last_action", "leg_kinematics")
     assert env.observation_space.shape == (34 + 3 + 2 + 12 + 24 + 2 * 34 + len(drives),)
-    assert (env.control_hz, env.gains, env.config.history) == (50, PDGains(50.0, 2.0), 1)
+    assert (env.control_hz, env.gains, env.config.history) == (50, PDGains(50.0, 2.0), 3)
 
 
 def test_without_channels_it_is_the_papers():
