@@ -30,7 +30,7 @@ def test_a_script_is_read_from_tuples_dictionaries_and_json():
     fields = {"time_s": 1, "task": "walk", "command": [0.3, 0, 0.5]}
     script = Script((Move(0, "trot"), fields, (2, "trot")), 3)
     assert script.moves == (Move(0.0, "trot", STAND), Move(1.0, "walk", (0.3, 0.0, 0.5)), Move(2.0, "trot"))
-    assert script.tasks == ("trot", "walk") and script.seconds == 3.0
+    assert script.task_names == ("trot", "walk") and script.seconds == 3.0
     assert Script(**json.loads(json.dumps(dataclasses.asdict(script)))) == script
 
 
@@ -69,7 +69,7 @@ def test_the_moves_are_made_in_their_step():
 
 
 def test_the_default_tour_shows_every_gait_from_a_stand_to_a_stand():
-    assert set(DEFAULT_TOUR.tasks) == set(BUILT_IN_TASKS)
+    assert set(DEFAULT_TOUR.task_names) == set(BUILT_IN_TASKS)
     assert 18.0 <= DEFAULT_TOUR.seconds <= 20.0
     first, last = DEFAULT_TOUR.moves[0], DEFAULT_TOUR.moves[-1]
     assert first.command == last.command == STAND and first.task == last.task == "trot"

@@ -77,7 +77,7 @@ class Script:
         object.__setattr__(self, "seconds", seconds)
 
     @property
-    def tasks(self) -> tuple[str, ...]:
+    def task_names(self) -> tuple[str, ...]:
         """Names of the gaits that are asked for, in the order of their first time."""
         return tuple(dict.fromkeys(move.task for move in self.moves))
 

@@ -77,7 +77,7 @@ def film_tour(
     refuse_overridden(env_kwargs, episode_s="script", render_mode="film_tour", task="script")
     film = Film(width, height, fps)
     kwargs = {"tasks": tuple(TASKS), **getattr(agent, "env_kwargs", {}), **env_kwargs, **film.env_kwargs}
-    for task in script.tasks:
+    for task in script.task_names:
         one_of(task, tuple(kwargs["tasks"]), "task of the script")
     control_hz = 0.0
 
@@ -92,7 +92,7 @@ def film_tour(
     _, series = setup.play(agent, kwargs, make_env, watch)
     frames = film.frames(round(script.seconds * fps))
     for i, frame in enumerate(frames):
-        said = reading(series, round(i / fps * control_hz), script.tasks, control_hz)
+        said = reading(series, round(i / fps * control_hz), script.task_names, control_hz)
         frames[i] = draw_captions(frame, said)
     return frames
 
