@@ -212,12 +212,11 @@ def _tasks_of_given(base: PolicyFile) -> tuple[str, ...]:
     """The gaits of a policy that can learn another.
 
     Raises:
-        InvalidInputError: if it has no heads, or sees several frames.
+        InvalidInputError: if it has no heads.
     """
     policy = base.load()
-    heads = isinstance(policy, trainers.MultiHeadPolicy) and not policy.pooled
-    if not heads or policy.contract.history != 1:
-        raise InvalidInputError(f"expected a policy with a head per gait that sees one frame, got {base.path}")
+    if not isinstance(policy, trainers.MultiHeadPolicy) or policy.pooled:
+        raise InvalidInputError(f"expected a policy with a head per gait, got {base.path}")
     return policy.tasks
 
 

@@ -139,7 +139,7 @@ def test_a_driver_that_falls_is_watched_until_shortly_before():
 
 def test_watching_refuses_a_driver_of_several_frames_and_no_time():
     with pytest.raises(InvalidInputError, match="sees 3 frames .*got 1"):
-        watch(Driver(history=3), "trot", make_env=make_stub)
+        watch(Driver(history=3), "trot", history=1, make_env=make_stub)
     with pytest.raises(InvalidInputError, match="seconds must be a finite number > 0"):
         watch(Driver(), "trot", 0, 0.0, make_env=make_stub)
 

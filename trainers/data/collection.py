@@ -133,7 +133,7 @@ def watch(
     seed: int = 0,
     seconds: float = 30.0,
     perturbation: PerturbationConfig | None = None,
-    history: int = 1,
+    history: int | None = None,
     *,
     make_env: EnvFactory = make_env,
     **env_kwargs: Any,
@@ -147,16 +147,17 @@ def watch(
         seed: of everything random.
         seconds: duration of the kept rows [s].
         perturbation: as in `CollectJob`.
-        history: frames of proprioception that are recorded; the policy sees as many as it was made for.
+        history: frames of proprioception that are recorded, if more than the policy sees.
         make_env: another environment factory.
         env_kwargs: of the environment; on top of the policy's own ``env_kwargs``.
 
     Raises:
-        InvalidInputError: if the policy sees more frames or was made for another environment, the seed is negative
-            or the seconds are not positive.
+        InvalidInputError: if the policy sees more frames than that or was made for another environment, the seed is
+            negative or the seconds are not positive.
         CollectionError: if falls leave less than a fifth of the steps.
     """
     frames = policy.contract.history
+    history = frames if history is None else history
     if frames > history:
         raise InvalidInputError(
             f"the policy sees {frames} frames of proprioception, history must be that or more, got {history}"
