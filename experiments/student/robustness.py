@@ -15,6 +15,7 @@ from experiments.study import EVALUATION_CODE, Cell, Metrics, Study, option
 from experiments.tables import Column, share, table
 from go1_mtl_gym.sensing.observation import SensorNoise
 from go1_mtl_gym.sensing.state_noise import EstimatorNoise
+from go1_mtl_gym.sim.domain_randomization import OF_SENSORS
 
 TARGET = 0.95
 """Fraction of episodes that a policy is to survive."""
@@ -33,8 +34,6 @@ QUANTITIES: dict[str, tuple[str, tuple[float, ...]]] = {
     "noise": ("noise, in units of the default", (0.0, 0.5, 1.0, 1.5, 2.0)),
 }
 """Name of a quantity -> what it is called, and its values from one end of the range to the other; see `world`."""
-OF_SENSORS = {"encoder_offset": "encoder_offset", "sensor_delay_s": "delay_s"}
-"""Quantities that are fields of `SensorParams`. The expert's state has none of them."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +66,7 @@ class Robustness(Study):
         return with_expert(self.policies)
 
     def cells(self, agent: Agent) -> list[Cell]:
+        # The expert's state has none of the sensors' faults.
         felt = [name for name in self.options.quantities if agent.name != EXPERT or name not in OF_SENSORS]
         return [Cell(task, quantity) for task in tasks_of(agent) for quantity in felt]
 

@@ -11,8 +11,8 @@ from go1_mtl_gym.sim.physics_params import PhysicsParams
 from go1_mtl_gym.validation import finite_vector, number_in
 
 Range = tuple[float, float] | None
-_OF_SENSORS = {"encoder_offset": "encoder_offset", "sensor_delay_s": "delay_s"}
-"""Ranges of fields of `SensorParams`."""
+OF_SENSORS = {"encoder_offset": "encoder_offset", "sensor_delay_s": "delay_s"}
+"""Range of `DomainRandomization` -> the field of `SensorParams` that it is of."""
 _CHANCES = {"fraction": "fraction of randomized episodes", "each": "each, the probability of being drawn"}
 SETTLE_S = (0.0, 10.0)
 """Shortest and longest time for which a robot may stand before an episode begins [s]."""
@@ -83,8 +83,8 @@ class DomainRandomization:
                     number_in(end, 0.0, 10.0, "factor on the sensor noise")
                 elif name == "settle_s":
                     number_in(end, *SETTLE_S, "settle_s [s]")
-                elif name in _OF_SENSORS:
-                    SensorParams(**{_OF_SENSORS[name]: end})
+                elif name in OF_SENSORS:
+                    SensorParams(**{OF_SENSORS[name]: end})
                 else:
                     PhysicsParams(**{name: end})
 
@@ -104,7 +104,7 @@ class DomainRandomization:
             if drawn_at[name] < self.each
         }
         noise, settle_s = drawn.pop("noise", base.noise), drawn.pop("settle_s", base.settle_s)
-        faults = {own: drawn.pop(name) for name, own in _OF_SENSORS.items() if name in drawn}
+        faults = {own: drawn.pop(name) for name, own in OF_SENSORS.items() if name in drawn}
         sensors = replace(base.sensors, **faults).drawn(rng)
         if chance >= self.fraction:
             return base
