@@ -12,7 +12,8 @@ from go1_mtl_gym.validation import Limits, check_numbers, finite_vector, number_
 
 LARGEST_OFFSET = 0.5
 """Of an encoder [rad]."""
-_DELAY = Limits(0.0, 0.05, " [s]")
+LIMITS = {"encoder_offset": Limits(0.0, LARGEST_OFFSET, " [rad]"), "delay_s": Limits(0.0, 0.05, " [s]")}
+"""What each figure of `SensorParams` may be, if it is a single number."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class SensorParams:
 
     def __post_init__(self) -> None:
         """Check the numbers, and bring them into one form."""
-        check_numbers(self, {"delay_s": _DELAY}, "sensor ")
+        check_numbers(self, {"delay_s": LIMITS["delay_s"]}, "sensor ")
         object.__setattr__(self, "encoder_offset", _checked_offset(self.encoder_offset))
 
     @property

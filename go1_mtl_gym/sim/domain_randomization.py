@@ -1,14 +1,17 @@
 """Physics and sensors that differ from episode to episode."""
 
 from dataclasses import dataclass, field, fields, replace
+from typing import Any
 
 import numpy as np
 
 from go1_mtl_gym.deprecation import renamed_arguments
 from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.sensing import sensor_faults
 from go1_mtl_gym.sensing.sensor_faults import SensorParams
+from go1_mtl_gym.sim import physics_params
 from go1_mtl_gym.sim.physics_params import PhysicsParams
-from go1_mtl_gym.validation import finite_vector, number_in
+from go1_mtl_gym.validation import Limits, finite_vector, number_in
 
 Range = tuple[float, float] | None
 OF_SENSORS = {"encoder_offset": "encoder_offset", "sensor_delay_s": "delay_s"}
@@ -16,6 +19,13 @@ OF_SENSORS = {"encoder_offset": "encoder_offset", "sensor_delay_s": "delay_s"}
 _CHANCES = {"fraction": "fraction of randomized episodes", "each": "each, the probability of being drawn"}
 SETTLE_S = (0.0, 10.0)
 """Shortest and longest time for which a robot may stand before an episode begins [s]."""
+_LIMITS = {
+    **physics_params.LIMITS,
+    **{name: sensor_faults.LIMITS[own] for name, own in OF_SENSORS.items()},
+    "noise": Limits(0.0, 10.0),
+    "settle_s": Limits(*SETTLE_S, " [s]"),
+}
+"""Range -> what its ends may be."""
 
 
 @dataclass(frozen=True)
@@ -79,14 +89,7 @@ class DomainRandomization:
                 raise InvalidInputError(f"range of {name} must be low <= high, got {(low, high)}")
             object.__setattr__(self, name, (low, high))  # equal to what comes back from JSON
             for end in (low, high):
-                if name == "noise":
-                    number_in(end, 0.0, 10.0, "factor on the sensor noise")
-                elif name == "settle_s":
-                    number_in(end, *SETTLE_S, "settle_s [s]")
-                elif name in OF_SENSORS:
-                    SensorParams(**{OF_SENSORS[name]: end})
-                else:
-                    PhysicsParams(**{name: end})
+                number_in(end, _LIMITS[name].low, _LIMITS[name].high, f"range of {name}{_LIMITS[name].unit}")
 
     def draw(self, rng: np.random.Generator, base: EpisodeConditions) -> EpisodeConditions:
         """Draw the figures of an episode; every call takes as many numbers from the generator.
@@ -109,6 +112,22 @@ class DomainRandomization:
         if chance >= self.fraction:
             return base
         return EpisodeConditions(replace(base.physics, **drawn), sensors, noise, settle_s)
+
+    def widened(self, share: float) -> "DomainRandomization":
+        """The same, with each end of every range further out by a share of the range's width, as far as it may go.
+
+        Args:
+            share: at least -0.5, which leaves the middle of each range.
+
+        Raises:
+            InvalidInputError: if it is less, or no number.
+        """
+        share = number_in(share, -0.5, 1e6, "share of the width of a range")
+        wider: dict[str, Any] = {}
+        for name, (low, high) in self._ranges().items():
+            out = share * (high - low)
+            wider[name] = max(low - out, _LIMITS[name].low), min(high + out, _LIMITS[name].high)
+        return replace(self, **wider)
 
     def _ranges(self) -> dict[str, tuple[float, float]]:
         """The ranges that are not None, by name."""

@@ -24,7 +24,7 @@ CHANGED_ARRAYS = (
 )
 """The arrays of a model that `PhysicsParams.apply` writes to."""
 _NONE = -1.0
-_ALLOWED = {
+LIMITS = {
     "friction": Limits(0.05, 2.0),
     "payload_kg": Limits(0.0, 10.0, " [kg]"),
     "action_delay_s": Limits(0.0, 0.05, " [s]"),
@@ -34,6 +34,7 @@ _ALLOWED = {
     "contact_time_s": Limits(0.002, 0.2, " [s]"),
     "joint_damping": Limits(0.0, 3.0, " [N m s/rad]"),
 }
+"""What each figure of `PhysicsParams` may be."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ class PhysicsParams:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        check_numbers(self, _ALLOWED)
+        check_numbers(self, LIMITS)
 
     @property
     def delay_steps(self) -> int:

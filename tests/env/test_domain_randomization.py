@@ -114,16 +114,29 @@ def test_it_survives_json():
         ({"rotor_inertia": (0.0, float("nan"))}, "range of rotor_inertia must be finite"),
         ({"contact_time_s": ("soft", "stiff")}, "range of contact_time_s must be 2 numbers.*soft"),
         ({"joint_damping": (0.0, 4.0)}, "joint_damping.*got 4"),
-        ({"encoder_offset": (-0.01, 0.01)}, r"sensor encoder_offset \[rad\] must lie in \[0, 0.5\], got -0.01"),
-        ({"sensor_delay_s": (0.0, 0.1)}, r"sensor delay_s \[s\] must lie in \[0, 0.05\], got 0.1"),
+        ({"encoder_offset": (-0.01, 0.01)}, r"range of encoder_offset \[rad\] must lie in \[0, 0.5\], got -0.01"),
+        ({"sensor_delay_s": (0.0, 0.1)}, r"range of sensor_delay_s \[s\] must lie in \[0, 0.05\], got 0.1"),
         ({"settle_s": (0.0, 11.0)}, r"settle_s \[s\] must lie in \[0, 10\], got 11"),
-        ({"noise": (-1.0, 1.0)}, "factor on the sensor noise.*got -1"),
+        ({"noise": (-1.0, 1.0)}, r"range of noise must lie in \[0, 10\], got -1"),
         ({"fraction": 1.5}, r"fraction of randomized episodes must lie in \[0, 1\], got 1.5"),
     ],
 )
 def test_impossible_ranges_are_refused(arguments, words):
     with pytest.raises(InvalidInputError, match=words):
         DomainRandomization(**arguments)
+
+
+def test_widened_ranges_end_further_out_but_nowhere_that_is_impossible():
+    default = DomainRandomization(fraction=0.5, each=0.5)
+    wider = default.widened(0.2)
+    assert wider.payload_kg == (0.0, pytest.approx(3.6)) and wider.action_delay_s == (0.0, pytest.approx(0.024))
+    assert wider.friction == pytest.approx((0.28, 1.12)) and wider.motor_strength == pytest.approx((0.86, 1.14))
+    assert wider.contact_time_s == pytest.approx((0.002, 0.191)) and wider.encoder_offset[1] == pytest.approx(0.072)
+    assert (wider.fraction, wider.each) == (0.5, 0.5) and default.widened(0.0) == default
+    assert NOTHING.widened(0.2) == NOTHING and default.widened(1e3).friction == (0.05, 2.0)
+    assert dataclasses.replace(NOTHING, noise=(1.0, 3.0)).widened(-0.5).noise == (2.0, 2.0)
+    with pytest.raises(InvalidInputError, match=r"share of the width.*got -0.6"):
+        default.widened(-0.6)
 
 
 # -- In the environment ------------------------------------------------------------------------------------------------

@@ -36,6 +36,7 @@ def test_hands_can_be_left_few_moves():
         ({"move_s": (2.0, 1.0)}, "move_s"),
         ({"stand_s": None}, "stand_s must be intervals"),
         ({"push_interval": 0.0}, "push_interval"),
+        ({"hard_push": -0.5}, "hard_push"),
         ({"hard_push_interval": "often"}, "hard_push_interval"),
         ({"task_interval": (0.0, 1.0)}, "task_interval"),
     ],

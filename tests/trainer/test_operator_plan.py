@@ -127,6 +127,8 @@ def test_hard_pushes_are_shares_of_what_the_expert_bears():
     hard = [push for push in plan(hard_push_interval=4.0).pushes if push.hard]
     assert len(hard) == pytest.approx(LONG_S / 4, rel=0.15)
     assert min(p.size for p in hard) >= 0.5 and max(p.size for p in hard) <= 1.0
+    harder = [push for push in plan(hard_push_interval=4.0, hard_push=1.2).pushes if push.hard]
+    assert [p.size for p in harder] == pytest.approx([1.2 * p.size for p in hard])
     task = TASKS["bound"]
     assert task.largest_push(0.0) == task.push_limit[0] and task.largest_push(np.pi) == pytest.approx(
         task.push_limit[1]

@@ -44,8 +44,9 @@ class OperatorConfig:
         braking_change: probability that letting go comes with a change of gait in the half second after it.
         push: largest push, a change of the trunk's velocity in any horizontal direction [m/s].
         push_interval: mean time between pushes [s], or None for none.
-        hard_push_interval: mean time between pushes of half to all of what the expert bears in the present gait and
-            that direction (`Task.largest_push`) [s], or None for none.
+        hard_push: largest hard push, as a share of what the expert bears in the present gait and that direction
+            (`Task.largest_push`); they begin at half of it.
+        hard_push_interval: mean time between hard pushes [s], or None for none.
 
     Raises:
         InvalidInputError: if a weight is negative or all are 0, or another figure is outside its range.
@@ -70,6 +71,7 @@ class OperatorConfig:
     braking_change: float = 0.2
     push: float = 0.3
     push_interval: float | None = 10.0
+    hard_push: float = 1.0
     hard_push_interval: float | None = None
 
     def __post_init__(self) -> None:
@@ -82,6 +84,7 @@ class OperatorConfig:
             set_field(name, number_in(getattr(self, name), 0.0, 1.0, name))
         set_field("deflection", number_in(self.deflection, 0.0, 3.0, "deflection"))
         set_field("push", number_in(self.push, 0.0, 5.0, "push [m/s]"))
+        set_field("hard_push", number_in(self.hard_push, 0.0, 3.0, "hard_push"))
         for name in ("push_interval", "hard_push_interval"):
             if getattr(self, name) is not None:
                 set_field(name, number_in(getattr(self, name), 0.1, 1e6, f"{name} [s]"))

@@ -228,6 +228,6 @@ def _pushes(config: OperatorConfig, seconds: float, rng: np.random.Generator) ->
     for interval, hard in ((config.push_interval, False), (config.hard_push_interval, True)):
         time_s = 0.0
         while interval is not None and (time_s := time_s + rng.exponential(interval)) < seconds:
-            size = rng.uniform(0.5, 1.0) if hard else config.push * np.sqrt(rng.uniform())
+            size = config.hard_push * rng.uniform(0.5, 1.0) if hard else config.push * np.sqrt(rng.uniform())
             pushes.append(Push(float(time_s), float(rng.uniform(-np.pi, np.pi)), float(size), hard))
     return sorted(pushes, key=lambda push: push.time_s)
