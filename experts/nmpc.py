@@ -247,7 +247,8 @@ class NMPCExpert:
         config = self.config
         for _ in range(config.sqp_iterations):
             model = linearize(states, inputs, horizon.feet, horizon.inertia_b, horizon.dt, horizon.mass)
-            solution = self._mpc.solve(model, horizon.x0, horizon.reference[1:], horizon.nominal, horizon.contact)
+            problem = model, horizon.x0, horizon.reference[1:], horizon.nominal, horizon.contact
+            solution = self._mpc.solve(*problem, friction=horizon.friction)
             self.counters.count(solution)
             if not solution.usable:
                 return horizon.reference, horizon.nominal, np.ones_like(horizon.contact)
@@ -290,5 +291,6 @@ def _is_plausible(state: RobotState) -> bool:
         state.v,
         state.command,
         (state.phase, state.time_s, state.payload_kg, state.joint_friction, state.joint_damping),
+        () if state.friction is None else (state.friction,),
     )
     return plausible(np.concatenate(numbers))

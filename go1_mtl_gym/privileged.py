@@ -20,12 +20,13 @@ def privileged_state(simulation: Simulation, episode: Episode, period: int) -> R
     """
     delay_steps = simulation.physics_params.delay_steps
     later, then = simulation.ahead(), episode.ahead(delay_steps, period)
-    friction, damping = simulation.joint_resistance
+    resistance, damping = simulation.joint_resistance
     return replace(
         robot_state(later, then.task.gait, then.phase, then.filtered_command, then.time_s),
         payload_kg=simulation.physics_params.payload_kg,
         motor_strength=simulation.physics_params.motor_strength,
-        joint_friction=friction,
+        friction=simulation.physics_params.friction,
+        joint_friction=resistance,
         joint_damping=damping,
         foot_sink=simulation.foot_sink,
     )

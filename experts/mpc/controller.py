@@ -59,11 +59,17 @@ class MPC:
         return type(self), (self.config,)
 
     def solve(
-        self, model: LinearModel, x0: np.ndarray, x_ref: np.ndarray, u_ref: np.ndarray, contact: np.ndarray
+        self,
+        model: LinearModel,
+        x0: np.ndarray,
+        x_ref: np.ndarray,
+        u_ref: np.ndarray,
+        contact: np.ndarray,
+        friction: float | None = None,
     ) -> Solution:
         """Solve one problem; arguments as in `QuadraticProgram.update`. Never raises for what the numbers are."""
         n, program = self.config.steps, self.program
-        program.update(model, x0, x_ref, u_ref, contact)
+        program.update(model, x0, x_ref, u_ref, contact, friction)
         if not plausible(program.q, program.A.data, program.l, contact):
             return Solution(x_ref, u_ref, 0, solved=False, usable=False)
         z, iterations, solved, usable = self._solver.solve(program, np.concatenate([x_ref, u_ref]).ravel())

@@ -28,6 +28,7 @@ class Horizon(NamedTuple):
         feet: where they push from [m], shape (N, 4, 3).
         inertia_b: composite inertia, trunk axes [kg m^2], shape (3, 3).
         mass: of the whole robot [kg].
+        friction: coefficient of friction of the ground, if the expert is told of it.
     """
 
     frame: Frame
@@ -39,6 +40,7 @@ class Horizon(NamedTuple):
     feet: np.ndarray
     inertia_b: np.ndarray
     mass: float
+    friction: float | None
 
 
 def pose_horizon(
@@ -82,6 +84,7 @@ def pose_horizon(
         feet=frame.points(feet_w),
         inertia_b=state.rotation.T @ dynamics.inertia_w @ state.rotation,
         mass=dynamics.mass,
+        friction=state.friction,
     )
 
 

@@ -6,8 +6,9 @@ Variables are the states x[1..N] and the inputs u[0..N-1] of `experts.mpc.srbd`:
     subject to  x[k+1] = A[k] x[k] + B[k] u[k] + c[k]
                 |f_x| <= mu f_z,  |f_y| <= mu f_z,  f_min [s[k] = 1] <= f_z <= f_max s[k]      for each foot,
 
-with s[k] the fraction of interval k that the foot spends on the ground, so that feet in the air get no force. (The
-program of J. Di Carlo et al., IROS 2018, with the states kept as variables, which leaves it sparse.)
+with s[k] the fraction of interval k that the foot spends on the ground, so that feet in the air get no force, and mu
+the configured coefficient of friction, or a smaller one that the expert is told of. (The program of J. Di Carlo et al.,
+IROS 2018, with the states kept as variables, which leaves it sparse.)
 """
 
 from dataclasses import dataclass, field
@@ -70,7 +71,13 @@ class QuadraticProgram:
         return self.u[self.state_size + NORMAL_ROW :: ROWS_PER_FOOT] > 0
 
     def update(
-        self, model: LinearModel, x0: np.ndarray, x_ref: np.ndarray, u_ref: np.ndarray, contact: np.ndarray
+        self,
+        model: LinearModel,
+        x0: np.ndarray,
+        x_ref: np.ndarray,
+        u_ref: np.ndarray,
+        contact: np.ndarray,
+        friction: float | None = None,
     ) -> None:
         """Write one problem into q, A, l, u.
 
@@ -80,8 +87,10 @@ class QuadraticProgram:
             x_ref: reference of x[1..N], shape (N, 12).
             u_ref: reference of the inputs in units of `FORCE_UNIT`, shape (N, 12).
             contact: fractions of each interval with ground contact, shape (N, 4).
+            friction: coefficient of the ground, if it is known; the smaller one of it and the configured one limits.
         """
-        end = self.state_size
+        end, configured = self.state_size, self.config.friction
+        self.A.data[self._to_mu] = configured if friction is None else min(configured, friction)
         self.A.data[self._to_a] = -model.A[1:].ravel().take(self._from_a)
         self.A.data[self._to_b] = -model.B.ravel().take(self._from_b)
         self.q[:end], self.q[end:] = x_ref.ravel(), u_ref.ravel()
@@ -112,7 +121,7 @@ class QuadraticProgram:
         return rows
 
     def _find_blocks(self) -> None:
-        """Learn where each entry of A[k] and B[k] stands in the data of the CSC matrix, by numbering them."""
+        """Learn where each entry of A[k], B[k] and each mu stands in the data of the CSC matrix, by numbering them."""
         n, numbered = self.config.steps, self.A.copy()
         numbered.data = np.arange(1.0, numbered.nnz + 1)
         number = numbered.toarray().astype(int) - 1
@@ -120,6 +129,9 @@ class QuadraticProgram:
         blocks_b = np.stack([number[self._after(k), self._pushed(k)] for k in range(n)])
         self._from_a, self._from_b = np.flatnonzero(blocks_a >= 0), np.flatnonzero(blocks_b >= 0)
         self._to_a, self._to_b = blocks_a.ravel()[self._from_a], blocks_b.ravel()[self._from_b]
+        sides = [n * NX + ROWS_PER_FOOT * foot + row for foot in range(4 * n) for row in range(NORMAL_ROW)]
+        normal_forces = [self.state_size + 3 * foot + 2 for foot in range(4 * n) for _ in range(NORMAL_ROW)]
+        self._to_mu = number[sides, normal_forces]
 
     def _after(self, k: int) -> slice:
         """Where x[k + 1] stands among the variables, and its dynamics among the rows."""

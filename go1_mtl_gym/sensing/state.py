@@ -29,6 +29,7 @@ class RobotState:
         time_s: since the reset [s].
         payload_kg: mass of a cube at the trunk's centre of mass that the expert is told of [kg].
         motor_strength: factor on the torques of the actuators, likewise.
+        friction: coefficient of sliding friction between feet and ground that the expert is told of, or None.
         joint_friction: dry friction of every joint beyond the model's, likewise [N m].
         joint_damping: of every joint beyond the model's, likewise [N m s/rad].
         foot_sink: how much deeper than the model's the feet of the standing robot sink into the ground, likewise [m].
@@ -47,6 +48,7 @@ class RobotState:
     time_s: float = 0.0
     payload_kg: float = 0.0
     motor_strength: float = 1.0
+    friction: float | None = None
     joint_friction: float = 0.0
     joint_damping: float = 0.0
     foot_sink: float = 0.0

@@ -10,6 +10,7 @@ from go1_mtl_gym import DomainRandomization, EnvConfig, Go1Env, InvalidInputErro
 from go1_mtl_gym.env_config import EXPERT_ONLY
 
 DIFFERENT = PhysicsParams(
+    friction=0.45,
     payload_kg=2.0,
     action_delay_s=0.012,
     motor_strength=0.9,
@@ -17,7 +18,7 @@ DIFFERENT = PhysicsParams(
     contact_time_s=0.1,
     joint_damping=0.6,
 )
-TOLD = ("payload_kg", "motor_strength", "joint_friction", "joint_damping", "foot_sink")
+TOLD = ("payload_kg", "motor_strength", "friction", "joint_friction", "joint_damping", "foot_sink")
 MOVING = tuple(each.name for each in dataclasses.fields(RobotState) if each.name not in (*TOLD, "contacts", "time_s"))
 
 
@@ -41,10 +42,10 @@ def same(one: RobotState, other: RobotState, names: tuple[str, ...] = MOVING) ->
 
 def test_the_differences_are_told_and_those_of_the_model_are_none():
     told = walking(privileged=True, physics=DIFFERENT).estimated_state
-    assert (told.payload_kg, told.motor_strength) == (2.0, 0.9)
+    assert (told.payload_kg, told.motor_strength, told.friction) == (2.0, 0.9, 0.45)
     assert told.joint_friction == pytest.approx(0.7 - 0.2) and told.joint_damping == pytest.approx(0.6 - 0.1)
     for state in (walking(physics=DIFFERENT).estimated_state, walking(privileged=True).estimated_state):
-        assert [getattr(state, name) for name in TOLD] == [0.0, 1.0, 0.0, 0.0, 0.0]
+        assert [getattr(state, name) for name in TOLD] == [0.0, 1.0, None, 0.0, 0.0, 0.0]
 
 
 @pytest.mark.parametrize("payload_kg", [0.0, 3.0])
@@ -62,6 +63,7 @@ def test_what_a_randomization_draws_is_told():
     for seed in range(3):
         env.reset(seed=seed)
         assert env.estimated_state.payload_kg == env.physics_params.payload_kg
+        assert env.estimated_state.friction == env.physics_params.friction
         assert env.estimated_state.joint_damping == pytest.approx(env.physics_params.joint_damping - 0.1)
         told.add(env.estimated_state.payload_kg)
     assert len(told) == 3

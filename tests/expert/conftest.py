@@ -25,7 +25,7 @@ def drive(task: str, steps: int = 60) -> Driven:
     env.expert_action()
     mpc, states, problems = env._expert._mpc, [], []
     solve = mpc.solve
-    mpc.solve = lambda *problem: (problems.append(problem), solve(*problem))[1]
+    mpc.solve = lambda *problem, **told: (problems.append(problem), solve(*problem, **told))[1]
     kept = []
     for step in range(steps):
         if step == steps // 2:

@@ -80,6 +80,19 @@ def test_friction_limits_what_a_hard_push_gets(mpc):
     np.testing.assert_allclose(force[:, 1], -0.5 * force[:, 2], atol=1.0)
 
 
+def test_a_slippery_ground_that_is_told_of_limits_more_and_a_rough_one_no_less(mpc):
+    model, x0, *rest = level()
+    thrown = x0.copy()
+    thrown[10] = 1.2
+    told = mpc.solve(model, thrown, *rest, friction=0.2)
+    force = told.forces_w
+    np.testing.assert_allclose(force[:, 1], -0.2 * force[:, 2], atol=1.0)
+    configured = MPC(MPCConfig(friction=0.2)).solve(model, thrown, *rest)
+    np.testing.assert_array_equal(told.inputs, configured.inputs)
+    untold = mpc.solve(model, thrown, *rest)
+    np.testing.assert_array_equal(mpc.solve(model, thrown, *rest, friction=0.9).inputs, untold.inputs)
+
+
 def test_the_same_problem_gives_the_same_bits_whatever_came_before(mpc, driven):
     problem, *others = driven.problems
     first = mpc.solve(*problem)
