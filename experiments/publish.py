@@ -4,15 +4,14 @@ Nothing in them is typed by hand; ``--check`` fails when what is committed is ou
 """
 
 import argparse
-import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
-import trainers
 from experiments import main_job
 from experiments.catalog import STUDIES, resolve, study_class
+from experiments.copying import CERTIFICATES, FILM, FILMED, POLICIES, copy_certificate, copy_run, film, is_certificate
 from experiments.plots import save_figure
-from experiments.results import Results, read_json, without_folders
+from experiments.results import Results, read_json
 from experiments.tables import markdown
 from go1_mtl_gym.errors import InvalidInputError
 from trainers import Certificate
@@ -22,20 +21,6 @@ ROOT = Path(__file__).resolve().parents[1]
 SUMMARY = ("<!-- results:summary -->", "<!-- /results:summary -->")
 """Around the table in README.md."""
 GENERATED = "<!-- Written by `python -m experiments publish` from the files beside it; do not edit. -->"
-COPIED = ("joint_targets.png", "gaits.gif")
-"""Files of a run that are published as they are."""
-FILM = "hero.webp"
-"""A policy of the package on a tour through its gaits, made anew with every `SHIPPED_PRESET` run."""
-POLICIES = {"policy.zip": "clocked.zip", "phase_free.zip": "phase_free.zip"}
-"""Policies of a run, and their names in ``trainers/assets/``, from where `trainers.load_pretrained` reads them."""
-FILMED = "policy.zip"
-"""The one that `FILM` shows."""
-PUBLISHED_PRESET, SHIPPED_PRESET = "default", "shipped"
-"""Of the run whose metrics are published, and of the one whose policies come with the package."""
-SETTINGS = "config.json"
-"""File of a run that says what its settings are."""
-CERTIFICATES = "certificate_*.json"
-"""What `trainers.certify` found out about the policies that come with the package."""
 
 
 @dataclass(frozen=True)
@@ -160,68 +145,6 @@ def texts(root: Path) -> dict[Path, str]:
     return files
 
 
-# -- A run of the main job ---------------------------------------------------------------------------------------------
-
-
-def copy_run(run: Path, root: Path) -> None:
-    """Copy what is published of a run; the output folder, which only its machine knows, is cut from the command.
-
-    Of a run of the preset "default" these are the metrics and pictures, of one of "shipped" the policies, of which a
-    film is made; those need not have been evaluated yet, which certificates do.
-
-    Args:
-        run: output folder of the main job.
-        root: of the checkout; results go to ``docs/results``, policies to ``trainers/assets``.
-
-    Raises:
-        InvalidInputError: if files are missing (all are named), the metrics cannot be read, or the run is of neither
-            preset.
-        go1_mtl_gym.rendering.RenderingError: if the film cannot be drawn on this machine.
-    """
-    preset = read_json(run / SETTINGS).get("preset") if (run / SETTINGS).is_file() else None
-    measured = ("metrics.json", *COPIED)
-    wanted = {PUBLISHED_PRESET: measured, SHIPPED_PRESET: tuple(POLICIES)}.get(str(preset), (*measured, *POLICIES))
-    missing = [name for name in (SETTINGS, *wanted) if not (run / name).is_file()]
-    if missing:
-        raise InvalidInputError(
-            f"{run} lacks {', '.join(missing)}; expected the --out folder of a finished main job"
-            + (" (gaits.gif needs OpenGL)" if "gaits.gif" in missing else "")
-        )
-    if preset == PUBLISHED_PRESET:
-        _copy_results(run, root / "docs" / "results")
-    elif preset == SHIPPED_PRESET:
-        assets = root / "trainers" / "assets"
-        film(run / FILMED, root)  # before they are copied: where nothing can be drawn, old policies keep their film
-        assets.mkdir(parents=True, exist_ok=True)
-        for name, published in POLICIES.items():
-            shutil.copyfile(run / name, assets / published)
-    else:
-        raise InvalidInputError(
-            f"a run of the preset {PUBLISHED_PRESET!r} or {SHIPPED_PRESET!r} was expected, {run} is one of {preset!r}"
-        )
-
-
-def film(policy: Path, root: Path) -> None:
-    """Drive a policy through `trainers.save_tour`, for the pages that show it; some minutes on software OpenGL.
-
-    Args:
-        policy: its file.
-        root: of the checkout.
-
-    Raises:
-        go1_mtl_gym.rendering.RenderingError: if no picture can be drawn on this machine.
-    """
-    trainers.save_tour(trainers.load(policy), root / "docs" / "results" / FILM)
-
-
-def _copy_results(run: Path, folder: Path) -> None:
-    metrics = read_json(run / "metrics.json")
-    results = main_job.results_of(metrics, without_folders(metrics.get("command", "")))
-    results.write(folder / f"{main_job.NAME}.json")
-    for name in COPIED:
-        shutil.copyfile(run / name, folder / name)
-
-
 def publish_command(arguments: list[str], root: Path = ROOT) -> None:
     """``publish``: write what is out of date.
 
@@ -230,7 +153,8 @@ def publish_command(arguments: list[str], root: Path = ROOT) -> None:
     """
     about = "Write docs/results/ and the summary of README.md from the results files."
     parser = argparse.ArgumentParser(prog="python -m experiments publish", description=about)
-    parser.add_argument("run", type=Path, nargs="?", help="output folder of a finished main job, copied first")
+    about_folder = "of a finished main job, or of a certificate of a policy in the package; copied first"
+    parser.add_argument("folder", type=Path, nargs="?", help=about_folder)
     parser.add_argument("--check", action="store_true", help="change nothing; fail if something is out of date")
     parser.add_argument("--film", action="store_true", help=f"make {FILM} anew, of the policy in the package")
     parser.add_argument("--draw", nargs="+", default=[], choices=tuple(STUDIES), help="redraw the pictures of studies")
@@ -238,8 +162,8 @@ def publish_command(arguments: list[str], root: Path = ROOT) -> None:
     for name in options.draw:
         draw(name, root / "docs" / "results")
     texts(root)  # a README without markers is an error before anything is copied
-    if options.run is not None and not options.check:
-        copy_run(options.run, root)
+    if options.folder is not None and not options.check:
+        (copy_certificate if is_certificate(options.folder) else copy_run)(options.folder, root)
     if options.film and not options.check:
         film(root / "trainers" / "assets" / POLICIES[FILMED], root)
     wanted = texts(root)

@@ -50,7 +50,7 @@ def parser() -> argparse.ArgumentParser:
     add("--out", required=True, help="folder of the certificate; an interrupted one goes on in the same folder")
     add("--tasks", nargs="+", choices=tuple(TASKS), help="gaits (default: all that the policy knows)")
     add("--conditions", nargs="+", choices=tuple(CONDITIONS), help="conditions (default: all)")
-    add("--claim", type=float, help="success rate that is claimed of the nominal world (default: 0.99)")
+    add("--claim", type=float, help="success rate that is claimed of the operator (default: 0.99)")
     add("--allowed-failures", type=int, help="failures that a claim bears in the end (default: 1)")
     add("--episodes", type=positive_int, help="largest number per gait and condition (default: what the claim needs)")
     add("--seconds", type=positive_float, help="of an episode (default: 30)")

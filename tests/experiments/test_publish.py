@@ -1,16 +1,18 @@
 """The command line, and the pages that are written from results."""
 
+import hashlib
 import json
 from pathlib import Path
 
 import pytest
 
 import trainers
-from experiments import publish
+from experiments import copying
 from experiments.__main__ import main
 from experiments.catalog import STUDIES, study_class
+from experiments.copying import copy_run
 from experiments.main_job import results_of
-from experiments.publish import copy_run, publish_command, summarized
+from experiments.publish import publish_command, summarized
 from experiments.results import Results, without_folders
 from go1_mtl_gym import InvalidInputError
 from go1_mtl_gym.rendering import RenderingError
@@ -35,7 +37,7 @@ def run(tmp_path) -> Path:
     folder.mkdir()
     (folder / "metrics.json").write_text(json.dumps(metrics()))
     (folder / "config.json").write_text(json.dumps({"preset": "default"}))
-    for name in (*publish.COPIED, *publish.POLICIES):
+    for name in (*copying.COPIED, *copying.POLICIES):
         (folder / name).write_bytes(name.encode())
     return folder
 
@@ -115,13 +117,29 @@ def test_where_no_film_can_be_made_the_old_policies_stay(run, root, filmed, monk
     assert not (root / "trainers").exists()
 
 
-def test_certificates_get_their_page(root):
-    folder = root / "docs" / "results"
-    folder.mkdir(parents=True)
-    certificate = trainers.certify("expert", tasks=("trot",), conditions=("drawn",), episodes=1, seconds=3.0)
-    (folder / "certificate_expert.json").write_text(json.dumps(certificate.as_dict()))
-    publish_command([], root)
-    assert (folder / "certificate_expert.md").read_text() == certificate.markdown()
+def test_certificates_get_their_page(root, tmp_path):
+    published = root / "docs" / "results" / "certificate_expert.json"
+    few = {"tasks": ("trot",), "conditions": ("drawn",), "episodes": 1, "seconds": 3.0}
+    certificate = trainers.certify("expert", tmp_path / "c", **few)
+    publish_command([str(tmp_path / "c")], root)
+    assert published.read_bytes() == (tmp_path / "c" / "certificate.json").read_bytes()
+    assert published.with_suffix(".md").read_text() == certificate.markdown()
+
+
+def test_only_certificates_of_what_is_in_the_package_are_published(root, tmp_path):
+    values = json.loads((FOLDER / "certificate_clocked.json").read_text())
+    (tmp_path / "certificate.json").write_text(json.dumps(values))
+    with pytest.raises(InvalidInputError, match=f"one of 'clocked' with SHA-256 {values['policy']['sha256']}$"):
+        publish_command([str(tmp_path)], root)
+    assets = root / "trainers" / "assets"
+    assets.mkdir(parents=True)
+    (assets / "clocked.zip").write_bytes(b"another")
+    with pytest.raises(InvalidInputError, match="the package's has [0-9a-f]{64}$"):
+        publish_command([str(tmp_path)], root)
+    values["policy"]["sha256"] = hashlib.sha256(b"another").hexdigest()
+    (tmp_path / "certificate.json").write_text(json.dumps(values))
+    publish_command([str(tmp_path)], root)
+    assert (root / "docs" / "results" / "certificate_clocked.md").is_file()
 
 
 @pytest.mark.parametrize("name", ["metrics.json", "gaits.gif", "joint_targets.png"])
@@ -155,7 +173,7 @@ def test_no_path_of_the_machine_is_published(tmp_path):
 
 def test_published_results_have_their_studies_and_their_pictures():
     published = [name for name in STUDIES if (FOLDER / f"{name}.json").is_file()]
-    certificates = {path.stem for path in FOLDER.glob(publish.CERTIFICATES)}
+    certificates = {path.stem for path in FOLDER.glob(copying.CERTIFICATES)}
     assert {path.stem for path in FOLDER.glob("*.json")} == {*published, *certificates, "main_job"}
     assert len(published) > 20
     for name in published:

@@ -81,11 +81,23 @@ def fallen():
 
 
 def test_a_policy_that_never_fails_stops_where_its_claim_is_met():
-    certificate = certify(Stepping(), conditions=("drawn", Condition("careful", "careful", claim=0.3)), **FEW)
-    assert [cell.name for cell in certificate.cells] == ["drawn/trot", "drawn/walk", "careful/trot", "careful/walk"]
+    certificate = certify(
+        Stepping(),
+        conditions=(
+            Condition("commanded", "drawn commands", operator=None),
+            Condition("careful", "careful", claim=0.3),
+        ),
+        **FEW,
+    )
+    assert [cell.name for cell in certificate.cells] == [
+        "commanded/trot",
+        "commanded/walk",
+        "careful/trot",
+        "careful/walk",
+    ]
     assert [cell.trials for cell in certificate.cells] == [5, 5, 3, 3] and certificate.met
     assert {cell.verdict for cell in certificate.cells} == {"met"}
-    assert certificate.cell("drawn", "walk").lower_bound == pytest.approx(0.05 ** (1 / 5))
+    assert certificate.cell("commanded", "walk").lower_bound == pytest.approx(0.05 ** (1 / 5))
     assert 0.5**5 < 0.05 < 0.5**4 and 0.3**3 < 0.05 < 0.3**2
 
 
@@ -157,7 +169,7 @@ def test_nobody_touches_the_stick_of_a_robot_that_is_to_stand():
 
     cell = certify(Nervous(), conditions=("standing",), episodes=3, **SHORT | {"tasks": ("trot",)}).cells[0]
     assert cell.outcomes == "uuu" and cell.passed == 3 and cell.failures == (), "a step is no fall"
-    assert not np.any(seen) and cell.plan.claim == 0.99
+    assert not np.any(seen) and cell.plan.claim == 0.95
     assert CONDITIONS["standing"].operator.push_interval == 10.0
     assert [*CONDITIONS][:3] == ["operator", "drawn", "standing"]
 

@@ -133,16 +133,13 @@ def _method(settings: Settings, versions: Mapping[str, str], cells: Sequence[Cel
     survival = f"Judged by survival: {', '.join(survivors)}. " if survivors else ""
     arguments = ", ".join(f"{name} {value}" for name, value in settings.env_kwargs.items()) or "as the policy has it"
     packages = ", ".join(f"{name} {version}" for name, version in versions.items())
-    return "\n".join(
-        [
-            f"Episodes of {settings.seconds:g} s, tours of {settings.tour_seconds:g} s; seed {settings.seed}. Success: "
-            f"survived, velocity error at most 0.15 m/s, and stepped at the gait's rate. {survival}"
-            f"{ends}Confidence {settings.confidence:.0%}.",
-            "",
-            *looks,
-            "",
-            "Intervals are Clopper and Pearson's, two-sided, and the lower bound one-sided; both as of a number of "
-            "episodes that was decided beforehand. "
-            f"Environment: {arguments}. {packages}.",
-        ]
-    )
+    paragraphs = [
+        f"Episodes of {settings.seconds:g} s, tours of {settings.tour_seconds:g} s; seed {settings.seed}. Success: "
+        f"survived, velocity error at most 0.15 m/s, and stepped at the gait's rate. {survival}"
+        f"{ends}Confidence {settings.confidence:.0%}.",
+        "\n".join(looks),
+        "Intervals are Clopper and Pearson's, two-sided, and the lower bound one-sided; both as of a number of "
+        "episodes that was decided beforehand. "
+        f"Environment: {arguments}. {packages}.",
+    ]
+    return "\n\n".join(paragraph for paragraph in paragraphs if paragraph)

@@ -17,7 +17,7 @@ COMMAND_INTERVAL_S = 5.0
 HARD_PUSHES_S = 5.0
 """Mean time between pushes at the edge of what the expert bears [s]."""
 WORLD_CLAIM = 0.95
-"""Success rate that is claimed of a world that is not the nominal one."""
+"""Success rate that is claimed of everything but an operator in the nominal world."""
 DRAWN_CLAIM = 0.90
 """The same where everything is drawn at once from the ranges of `DomainRandomization`."""
 TOUR_CLAIM = 0.9704
@@ -93,9 +93,9 @@ CONDITIONS = {
     each.name: each
     for each in (
         Condition("operator", "operator"),
-        Condition("drawn", "drawn commands", operator=None),
+        Condition("drawn", "drawn commands", operator=None, claim=WORLD_CLAIM),
         # A robot that is pushed steps to keep its balance, which success would not allow it.
-        Condition("standing", "nobody touches the stick", UNTOUCHED, judged_by="survival"),
+        Condition("standing", "nobody touches the stick", UNTOUCHED, claim=WORLD_CLAIM, judged_by="survival"),
         world("delay", "delay 20 ms", action_delay_s=0.02),
         world("payload", "payload 3 kg", payload_kg=3.0),
         world("friction", "friction 0.4", friction=0.4),
