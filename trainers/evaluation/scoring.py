@@ -1,6 +1,7 @@
 """What an episode is scored by, and the scores of several."""
 
 import dataclasses
+import functools
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -47,7 +48,7 @@ class Series:
     moves: tuple[str, ...] = ()
     events: tuple[tuple[str, ...], ...] = ()
 
-    @property
+    @functools.cached_property
     def gaits(self) -> tuple[Gait, ...]:
         """Of the tasks, after each step."""
         return tuple(TASKS[name].gait for name in self.tasks)
