@@ -103,9 +103,9 @@ def failing(monkeypatch, expert: NMPCExpert, after: int = 0) -> None:
     """Let every solve fail, but for the first few."""
     solve, count = expert._mpc.solve, iter(range(10**6))
 
-    def fail(*problem):
+    def fail(*problem, **told):
         if next(count) < after:
-            return solve(*problem)
+            return solve(*problem, **told)
         return Solution(np.full((16, 12), np.nan), np.full((16, 12), np.nan), 300, solved=False, usable=False)
 
     monkeypatch.setattr(expert._mpc, "solve", fail)
@@ -152,7 +152,7 @@ def test_inexact_solves_are_counted_and_used(standing, monkeypatch):
     expert = fresh(standing)
     inputs = np.tile([0.0, 0.0, 0.5], (16, 4))
     close = Solution(np.tile(standing.rpy[0], (16, 12)), inputs, 300, solved=False, usable=True)
-    monkeypatch.setattr(expert._mpc, "solve", lambda *problem: close)
+    monkeypatch.setattr(expert._mpc, "solve", lambda *problem, **told: close)
     forces = expert.forces(standing, expert._model.dynamics(standing))
     np.testing.assert_array_equal(forces, np.tile([0.0, 0.0, 0.5 * FORCE_UNIT], (4, 1)))
     assert expert.counters.inexact_solves == expert.counters.solves > 0

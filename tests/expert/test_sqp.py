@@ -63,7 +63,7 @@ def test_a_converged_solution_is_a_fixed_point(task, monkeypatch):
     calls, problems = [], []
     linearize, solve = nmpc.linearize, expert._mpc.solve
     monkeypatch.setattr(nmpc, "linearize", lambda *args: (calls.append(args), linearize(*args))[1])
-    monkeypatch.setattr(expert._mpc, "solve", lambda *args: (problems.append(args), solve(*args))[1])
+    monkeypatch.setattr(expert._mpc, "solve", lambda *args, **told: (problems.append(args), solve(*args, **told))[1])
     states = episode(task, 40, push=0.3)
     for state in states[30:]:
         plan = expert.plan(state, expert._model.dynamics(state))
