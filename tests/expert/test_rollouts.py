@@ -184,6 +184,7 @@ def test_trots_at_other_rates(control_hz):
     ("task", "physics"),
     [
         ("pace", {"action_delay_s": 0.02}),
+        ("pace", {"friction": 0.25}),
         ("bound", {"payload_kg": 3.0}),
         ("bound", {"action_delay_s": 0.015}),
         ("walk", {"joint_friction": 1.0, "joint_damping": 1.0, "contact_time_s": 0.1, "action_delay_s": 0.012}),
