@@ -71,7 +71,10 @@ def load(path: str | os.PathLike[str]) -> mujoco.MjModel:
     _add_surroundings(spec)
     spec.option.timestep, spec.option.integrator = 0.001, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
-    model = spec.compile()
+    try:
+        model = spec.compile()
+    except ValueError as error:  # a mesh that is not there, for one
+        raise InvalidInputError(f"{str(path)!r} does not compile: {error}") from error
     _check(model, path)
     return model
 

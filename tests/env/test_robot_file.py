@@ -18,6 +18,9 @@ from go1_mtl_gym.sim.simulation import Simulation
 OURS = Path(robot.MODEL_PATH).read_text(encoding="utf-8")
 
 
+MESH = '<mesh name="lost" file="lost.stl"/>'
+
+
 def respelled(text: str = OURS) -> str:
     """Our robot with right legs first, joints as in ANYmal's files, feet called after their legs, and a base."""
     legs = dict(zip(("FL", "FR", "RL", "RR"), re.findall(r'<body name="\w\w_hip".*?^      </body>', text, re.M | re.S)))
@@ -110,6 +113,7 @@ def test_a_scene_keeps_its_floor():
         (lambda text: text.replace("LF_KFE", "tail"), "joints with names"),
         (lambda text: text.replace('pos="0 0 -0.213"', 'pos="0 0 -0.26"'), "home pose"),
         (lambda text: text[:200], "no MJCF"),
+        (lambda text: text.replace("<worldbody>", f"<asset>{MESH}</asset><worldbody>"), "does not compile: .*lost.stl"),
     ],
 )
 def test_what_is_no_go1_is_refused(tmp_path, change, message):
