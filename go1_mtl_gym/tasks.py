@@ -136,7 +136,7 @@ _REGISTRY = {
             GAITS["gallop"],
             command_range=(1.3, 0.5, 1.0),
             command_limit=(2.5, 1.0, 3.0),
-            push_limit=(2.1, 2.1, 2.2),
+            push_limit=(2.1, 0.9, 2.2),
         ),
     )
 }

@@ -53,7 +53,7 @@ SETTINGS = {
     "randomized_s": "perturbed, with drawn physics and sensors, per gait [s]",
     "operator": "an [operator](#the-operator) in perturbed ones, rounds and evaluation",
     "world_s": "length of the episodes in which they are drawn [s]",
-    "margin": "reach of operator and drawn physics in demonstrations and rounds, as a multiple of the evaluated one",
+    "margin": "reach of the operator in demonstrations and rounds, as a multiple of the evaluated one",
     "hard_push_interval": "mean time between hard pushes in `hard_push_s` [s]",
     "held_out_s": "held-out demonstrations per gait [s]",
     "mirror": "rows in the mirror as well",

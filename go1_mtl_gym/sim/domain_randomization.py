@@ -1,7 +1,6 @@
 """Physics and sensors that differ from episode to episode."""
 
 from dataclasses import dataclass, field, fields, replace
-from typing import Any
 
 import numpy as np
 
@@ -112,22 +111,6 @@ class DomainRandomization:
         if chance >= self.fraction:
             return base
         return EpisodeConditions(replace(base.physics, **drawn), sensors, noise, settle_s)
-
-    def widened(self, share: float) -> "DomainRandomization":
-        """The same, with each end of every range further out by a share of the range's width, as far as it may go.
-
-        Args:
-            share: at least -0.5, which leaves the middle of each range.
-
-        Raises:
-            InvalidInputError: if it is less, or no number.
-        """
-        share = number_in(share, -0.5, 1e6, "share of the width of a range")
-        wider: dict[str, Any] = {}
-        for name, (low, high) in self._ranges().items():
-            out = share * (high - low)
-            wider[name] = max(low - out, _LIMITS[name].low), min(high + out, _LIMITS[name].high)
-        return replace(self, **wider)
 
     def _ranges(self) -> dict[str, tuple[float, float]]:
         """The ranges that are not None, by name."""

@@ -126,19 +126,6 @@ def test_impossible_ranges_are_refused(arguments, words):
         DomainRandomization(**arguments)
 
 
-def test_widened_ranges_end_further_out_but_nowhere_that_is_impossible():
-    default = DomainRandomization(fraction=0.5, each=0.5)
-    wider = default.widened(0.2)
-    assert wider.payload_kg == (0.0, pytest.approx(3.6)) and wider.action_delay_s == (0.0, pytest.approx(0.024))
-    assert wider.friction == pytest.approx((0.28, 1.12)) and wider.motor_strength == pytest.approx((0.86, 1.14))
-    assert wider.contact_time_s == pytest.approx((0.002, 0.191)) and wider.encoder_offset[1] == pytest.approx(0.072)
-    assert (wider.fraction, wider.each) == (0.5, 0.5) and default.widened(0.0) == default
-    assert NOTHING.widened(0.2) == NOTHING and default.widened(1e3).friction == (0.05, 2.0)
-    assert dataclasses.replace(NOTHING, noise=(1.0, 3.0)).widened(-0.5).noise == (2.0, 2.0)
-    with pytest.raises(InvalidInputError, match=r"share of the width.*got -0.6"):
-        default.widened(-0.6)
-
-
 # -- In the environment ------------------------------------------------------------------------------------------------
 
 

@@ -39,7 +39,7 @@ def job_parser() -> argparse.ArgumentParser:
         choices=[*PRESETS],
         default="default",
         help="smoke: a few minutes; default: about half an hour on two quiet cores; shipped, for policies like those "
-        "in the package: about an hour and a half; paper: a day (an estimate)",
+        "in the package: one to two hours (an estimate); paper: a day (an estimate)",
     )
     add("--out", help="folder of the results; an interrupted run goes on in the same one (default: runs/<date>)")
     add("--tasks", nargs="+", choices=tuple(TASKS), help="gaits, in head order; the preset's if not given")

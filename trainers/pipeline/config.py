@@ -59,9 +59,8 @@ class JobConfig:
         clean_s, perturbed_s, hard_push_s, randomized_s, held_out_s: demonstrations: undisturbed, perturbed, perturbed
             and pushed hard, perturbed with physics and sensors that are drawn, and undisturbed for the R2.
         operator: whose hands drive in perturbed demonstrations, rounds and evaluation; None draws commands and gaits.
-        margin: how far demonstrations and rounds reach beyond what the policy is evaluated with: the operator's
-            deflection and hard pushes are so many times as large, and each end of the ranges that physics and sensors
-            are drawn from lies further out by the rest of it, times the range's width.
+        margin: how far the operator of demonstrations and rounds reaches, as a multiple of the deflection that the
+            policy is evaluated with.
         hard_push_interval: mean time between pushes at the edge of what the expert bears in `hard_push_s` [s]; in
             rounds they come half as often. None pushes hard nowhere.
         randomized: fraction of the episodes in rounds whose physics and sensors are drawn, by the ranges of
@@ -107,7 +106,7 @@ class JobConfig:
     hard_push_s: float = _from(0, 90.0)
     randomized_s: float = _from(0, 90.0)
     operator: OperatorConfig | None = OperatorConfig()
-    margin: float = _from(0.5, 1.2)
+    margin: float = _from(0, 1.2, above=True)
     hard_push_interval: float | None = _from(0, 2.5, above=True)
     held_out_s: float = _from(0, 60.0, above=True)
     randomized: float = _from(0, 0.3)
@@ -203,7 +202,7 @@ class JobConfig:
         """
         if not fraction:
             return {}
-        randomization = DomainRandomization(fraction=fraction, each=EACH).widened(self.margin - 1.0)
+        randomization = DomainRandomization(fraction=fraction, each=EACH)
         return {"randomization": randomization, "privileged": True, "episode_s": self.world_s}
 
     def perturbation(self, noise_rad: float, hard_push_interval: float | None = None) -> PerturbationConfig:
@@ -218,7 +217,6 @@ class JobConfig:
             operator = dataclasses.replace(
                 operator if several else operator.of_one_gait(),
                 hard_push_interval=hard_push_interval,
-                hard_push=self.margin * operator.hard_push,
                 deflection=self.margin * operator.deflection,
             )
         return PerturbationConfig(
