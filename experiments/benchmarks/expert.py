@@ -140,8 +140,9 @@ class Ours:
         mpc = self.expert._mpc
         solve = mpc.solve
 
-        def remember(*problem: Any) -> Any:
-            self.problem, self.solution = problem, solve(*problem)
+        def remember(*problem: Any, friction: float | None) -> Any:
+            self.problem = (*problem, friction)
+            self.solution = solve(*self.problem)
             return self.solution
 
         mpc.solve = remember
