@@ -136,13 +136,13 @@ class Ours:
     def __init__(self, config: MPCConfig) -> None:
         self.expert = NMPCExpert(config=NMPCConfig(mpc=config))
         self.problem: tuple[Any, ...] = ()
+        self.told: dict[str, Any] = {}
         self.solution: Any = None
         mpc = self.expert._mpc
         solve = mpc.solve
 
-        def remember(*problem: Any, friction: float | None) -> Any:
-            self.problem = (*problem, friction)
-            self.solution = solve(*self.problem)
+        def remember(*problem: Any, **told: Any) -> Any:
+            self.problem, self.told, self.solution = problem, told, solve(*problem, **told)
             return self.solution
 
         mpc.solve = remember
@@ -151,8 +151,8 @@ class Ours:
         """Seconds of every scope."""
         dynamics, mpc = self.expert._model.dynamics(state), self.expert._mpc
         update = elapsed(lambda: self.expert.forces(state, dynamics))
-        data = elapsed(lambda: mpc.program.update(*self.problem))
-        both = elapsed(lambda: mpc.solve(*self.problem))
+        data = elapsed(lambda: mpc.program.update(*self.problem, **self.told))
+        both = elapsed(lambda: mpc.solve(*self.problem, **self.told))
         return {"qp": both - data, "update": update, "action": elapsed(lambda: self.expert.action(state))}
 
 
