@@ -1,6 +1,5 @@
 """What is published of the folders that the main job and `trainers.certify` write."""
 
-import hashlib
 import shutil
 from pathlib import Path
 
@@ -9,6 +8,7 @@ from experiments import main_job
 from experiments.results import read_json, without_folders
 from go1_mtl_gym.errors import InvalidInputError
 from trainers import Certificate
+from trainers.evaluation.agents import identity
 from trainers.evaluation.certificate import FILE
 from trainers.utils.files import write_atomically
 
@@ -105,7 +105,7 @@ def copy_certificate(folder: Path, root: Path) -> None:
     certificate = Certificate.read(folder)
     name, digest = certificate.policy["name"], certificate.policy["sha256"]
     policy = root / "trainers" / "assets" / f"{name}.zip"
-    packaged = hashlib.sha256(policy.read_bytes()).hexdigest() if policy.is_file() else None
+    packaged = identity(policy)["sha256"] if policy.is_file() else None
     if name != "expert" and digest != packaged:
         raise InvalidInputError(
             f"a certificate of the expert or of a policy in the package was expected, {folder} is one of {name!r} with "
