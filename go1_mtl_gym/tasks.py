@@ -22,7 +22,7 @@ class Task:
         gait: the contact plan.
         command_range: largest |vx|, |vy| [m/s] and |yaw rate| [rad/s] that are drawn at random.
         command_limit: largest |vx|, |vy|, |yaw rate| that the environment accepts; of the built-in tasks, the largest
-            along each axis that the expert survived in 20 of 20 episodes (docs/results/expert.json, "limits").
+            along each axis that the expert survived in 20 of 20 episodes (docs/results/expert_limits.json).
         reward: weights of the reward terms.
         push_limit: largest push forward, backward and sideways, a change of the trunk's velocity [m/s]; of the built-in
             tasks, what the expert survives at every phase while it walks at 0.3 m/s (docs/results/expert_pushes.json).
@@ -101,42 +101,42 @@ _REGISTRY = {
             GAITS["trot"],
             command_range=(1.3, 0.6, 1.3),
             command_limit=(2.0, 1.0, 3.0),
-            push_limit=(2.0, 2.0, 2.1),
+            push_limit=(2.0, 1.8, 2.1),
         ),
         Task(
             "bound",
             GAITS["bound"],
             command_range=(1.4, 0.6, 1.3),
             command_limit=(2.1, 1.0, 3.0),
-            push_limit=(2.0, 0.9, 2.2),
+            push_limit=(2.0, 0.9, 2.1),
         ),
         Task(
             "jump",
             GAITS["jump"],
             command_range=(0.9, 0.35, 1.0),
             command_limit=(1.7, 0.7, 3.0),
-            push_limit=(2.0, 1.9, 1.0),
+            push_limit=(2.2, 1.8, 1.1),
         ),
         Task(
             "walk",
             GAITS["walk"],
             command_range=(0.6, 0.4, 1.0),
             command_limit=(1.1, 0.9, 2.0),
-            push_limit=(1.5, 1.9, 1.3),
+            push_limit=(1.4, 2.0, 1.3),
         ),
         Task(
             "pace",
             GAITS["pace"],
             command_range=(1.3, 0.5, 1.0),
             command_limit=(2.5, 1.0, 3.0),
-            push_limit=(2.2, 2.5, 1.1),
+            push_limit=(2.3, 2.6, 1.2),
         ),
         Task(
             "gallop",
             GAITS["gallop"],
             command_range=(1.3, 0.5, 1.0),
             command_limit=(2.5, 1.0, 3.0),
-            push_limit=(2.1, 0.9, 2.2),
+            push_limit=(1.9, 1.3, 2.3),
         ),
     )
 }

@@ -155,3 +155,10 @@ def test_the_environment_accepts_what_the_published_limits_say_is_survived(task)
     }
     ahead = min(survived["vx"], survived["-vx"])
     assert TASKS[task].command_limit == (ahead, survived["vy"], survived["yaw"])
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_an_operator_pushes_as_hard_as_the_published_results_say_is_survived(task):
+    largest = {own["condition"]: own["largest"] for own in Results.read(FOLDER / "expert_pushes.json").of(task=task)}
+    sideways = min(largest["left"], largest["right"])
+    assert TASKS[task].push_limit == (largest["forward"], largest["backward"], sideways)
