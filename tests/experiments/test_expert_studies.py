@@ -57,6 +57,12 @@ def test_the_course_accepts_what_the_environment_refuses():
     assert (np.abs(course.step(np.zeros(12))[4]["command"]) <= TASKS["trot"].command_range).all()
 
 
+def test_a_search_for_the_largest_command_may_pass_the_environments_limit():
+    beyond = 1.2 * TASKS["trot"].command_limit[0]
+    errors = limits.episodes(expert_lab.Lab(), "trot", "vx", beyond, trials=1, seconds=2.5, seed=0)
+    assert errors is not None and np.isfinite(errors).all()
+
+
 def test_a_lab_that_was_used_before_gives_the_same_walk():
     fresh, used = expert_lab.Lab(), expert_lab.Lab()
     used.begin("jump", (0.2, 0.1, 0.3), "first")
