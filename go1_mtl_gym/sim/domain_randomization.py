@@ -15,7 +15,11 @@ from go1_mtl_gym.validation import Limits, finite_vector, number_in
 Range = tuple[float, float] | None
 OF_SENSORS = {"encoder_offset": "encoder_offset", "sensor_delay_s": "delay_s"}
 """Range of `DomainRandomization` -> the field of `SensorParams` that it is of."""
-_CHANCES = {"fraction": "fraction of randomized episodes", "each": "each, the probability of being drawn"}
+_CHANCES = {
+    "fraction": "fraction of randomized episodes",
+    "each": "each, the probability of being drawn",
+    "ends": "ends, the probability of an end of a range",
+}
 SETTLE_S = (0.0, 10.0)
 """Shortest and longest time for which a robot may stand before an episode begins [s]."""
 _LIMITS = {
@@ -59,6 +63,8 @@ class DomainRandomization:
         fraction: of the episodes that are randomized; the others are as without randomization.
         each: probability with which each of the figures is drawn in such an episode; the others are the environment's
             own. Below 1 there are episodes in which only one or two things differ, which are what a robot meets.
+        ends: probability with which a drawn figure is one of the two ends of its range, where robots fall first, and
+            which would otherwise be drawn never.
 
     Raises:
         InvalidInputError: if a range is not low <= high, or one of its ends is an impossible figure.
@@ -78,6 +84,7 @@ class DomainRandomization:
     settle_s: Range = (0.0, 0.5)
     fraction: float = 1.0
     each: float = 1.0
+    ends: float = 0.0
 
     def __post_init__(self) -> None:
         """Check the ranges, and bring them into one form."""
@@ -101,7 +108,7 @@ class DomainRandomization:
         chance, *levels = rng.uniform(size=1 + len(names)).tolist()
         level, drawn_at = dict(zip(names, levels)), dict(zip(names, rng.uniform(size=len(names)).tolist()))
         drawn = {
-            name: min(low + level[name] * (high - low), high)  # rounding must not lead beyond the end
+            name: min(low + self._place(level[name]) * (high - low), high)  # rounding must not lead beyond the end
             for name, (low, high) in self._ranges().items()
             if drawn_at[name] < self.each
         }
@@ -111,6 +118,12 @@ class DomainRandomization:
         if chance >= self.fraction:
             return base
         return EpisodeConditions(replace(base.physics, **drawn), sensors, noise, settle_s)
+
+    def _place(self, level: float) -> float:
+        """Where in a range a uniform draw from [0, 1) leads: both ends gather half of `ends` each."""
+        if self.ends == 1.0:
+            return float(level >= 0.5)
+        return min(max((level - self.ends / 2) / (1.0 - self.ends), 0.0), 1.0)
 
     def _ranges(self) -> dict[str, tuple[float, float]]:
         """The ranges that are not None, by name."""

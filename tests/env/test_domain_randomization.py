@@ -62,6 +62,19 @@ def test_figures_are_drawn_one_by_one_if_asked_to():
         DomainRandomization(each=1.5)
 
 
+def test_the_ends_of_a_range_gather_draws_if_asked_to():
+    loaded = np.array(
+        [one.physics.payload_kg for one in draws(DomainRandomization(payload_kg=(1.0, 2.0), ends=0.4), 4000)]
+    )
+    assert (loaded == 1.0).mean() == pytest.approx(0.2, abs=0.03) == (loaded == 2.0).mean()
+    between = loaded[(loaded > 1.0) & (loaded < 2.0)]
+    np.testing.assert_allclose(np.quantile(between, [0.25, 0.5, 0.75]), [1.25, 1.5, 1.75], atol=0.04)
+    always = np.array([one.physics.payload_kg for one in draws(DomainRandomization(ends=1.0), 200)])
+    assert set(always) == {0.0, 3.0}
+    with pytest.raises(InvalidInputError, match="ends.*got -0.1"):
+        DomainRandomization(ends=-0.1)
+
+
 def test_every_encoder_errs_by_its_own_share_of_a_magnitude_that_is_drawn():
     randomization = DomainRandomization(encoder_offset=(0.02, 0.06))
     offsets = np.array([one.sensors.encoder_offset for one in draws(randomization, 2000)])

@@ -113,7 +113,7 @@ def test_what_follows_for_the_stages():
     gentle = config.with_options(hard_push_interval=None)
     assert gentle.round_perturbation.operator.hard_push_interval is None
     assert len(training_jobs(config)) - len(training_jobs(gentle)) == 6 * 6
-    ranges = DomainRandomization(fraction=0.3, each=0.5)
+    ranges = DomainRandomization(fraction=0.3, each=0.3, ends=0.4)
     assert config.randomization_kwargs(0.3)["randomization"] == ranges
     assert config.randomization_kwargs(0.3)["episode_s"] == config.world_s == 5.0
     assert config.randomization_kwargs(0.0) == {}

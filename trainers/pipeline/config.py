@@ -28,8 +28,8 @@ NOISE_RAD = 0.06
 """Largest standard deviation of the noise on the expert's actions in perturbed demonstrations [rad]."""
 ROUND_NOISE_RAD = 0.02
 """The same in DAgger rounds, where the learner perturbs enough [rad]."""
-EACH = 0.5
-"""Probability with which each figure of the world is drawn in a randomized episode."""
+EACH, ENDS = 0.3, 0.4
+"""Probability with which each figure of the world is drawn in a randomized episode, and then is an end of its range."""
 DEVICES = ("cpu", "cuda")
 
 
@@ -202,7 +202,7 @@ class JobConfig:
         """
         if not fraction:
             return {}
-        randomization = DomainRandomization(fraction=fraction, each=EACH)
+        randomization = DomainRandomization(fraction=fraction, each=EACH, ends=ENDS)
         return {"randomization": randomization, "privileged": True, "episode_s": self.world_s}
 
     def perturbation(self, noise_rad: float, hard_push_interval: float | None = None) -> PerturbationConfig:
