@@ -215,9 +215,9 @@ def test_a_policy_of_a_task_that_is_not_registered_says_how_to_register_it():
         policy.make_env("crawl")
 
 
-def test_commands_and_numbers_are_checked_before_the_first_episode(policy):
+def test_commands_and_numbers_are_checked_before_the_first_episode(policy, monkeypatch):
     for arguments, message in (
-        ({"commands": [(0.1, 0, 0), (9, 0, 0)]}, "must lie within"),
+        ({"commands": [(0.1, 0, 0), (9, 0)]}, "vx, vy, yaw rate"),
         ({"episodes": 1.5}, "episodes"),
         ({"seconds": "1"}, "seconds"),
         ({"seed": -1}, "seed"),
@@ -226,6 +226,9 @@ def test_commands_and_numbers_are_checked_before_the_first_episode(policy):
     ):
         with pytest.raises(InvalidInputError, match=message):
             evaluate(policy, "trot", make_env=None, **arguments)
+    monkeypatch.setattr("trainers.evaluation.closed_loop.run_all", None)
+    with pytest.raises(InvalidInputError, match="must lie within"):
+        evaluate(policy, "trot", commands=[(0.1, 0, 0), (9, 0, 0)])
 
 
 def test_a_result_prints_as_one_line(policy):
