@@ -58,29 +58,51 @@ class EpisodeSetup:
         Returns:
             The scores, and what was measured.
         """
-        rng = np.random.default_rng(derive_seed("commands", self.seed))
-        draw = TASKS[self.task].draw_corner if self.corners else TASKS[self.task].draw_command
-        options: dict[str, Any] = {"task": self.task}
-        if self.command is not None or self.corners:
-            options["command"] = tuple(draw(rng).tolist()) if self.command is None else self.command
+        commands = DrawnCommands(self)
         with opened(make_env, self.task, {**env_kwargs, "episode_s": self.seconds}) as env:
-            base = base_env(env)
-            if self.operator is not None:
-                env = OperatorWrapper(env, self.operator)
-            rollout = Rollout(env, policy_or_expert, self.seed, options)
-            given = [rollout.command]
-            steps = round(self.seconds * base.control_hz)
-            every = max(1, round(self.command_interval * base.control_hz)) if self.command_interval else steps
+            base, env = base_env(env), self.in_hands(env)
+            rollout = Rollout(env, policy_or_expert, self.seed, commands.options)
 
             def before_step(i: int) -> None:
                 if watch is not None:
                     watch(env, i)
-                if i and i % every == 0:
-                    given.append(tuple(draw(rng).tolist()))
-                    base.set_command(given[-1])
+                commands.drive(env, i)
 
-            series = rollout.walk(steps, before_step)
+            series = rollout.walk(round(self.seconds * base.control_hz), before_step)
             if watch is not None:
                 watch(env, len(series.measured))
-        task = self.task if self.operator is None else None
-        return score(series, rollout.fallen, self.seed, tuple(given), base.control_hz, task), series
+        task, given = self.task if self.operator is None else None, (rollout.command, *commands.given)
+        return score(series, rollout.fallen, self.seed, given, base.control_hz, task), series
+
+    def in_hands(self, env: gymnasium.Env) -> gymnasium.Env:
+        """The environment, in the operator's hands if there is one."""
+        return env if self.operator is None else OperatorWrapper(env, self.operator)
+
+
+class DrawnCommands:
+    """The commands of an episode that nobody's hands give; the same in every process.
+
+    Args:
+        setup: of the episode.
+
+    Attributes:
+        options: of the reset that the episode begins with.
+        given: commands (vx [m/s], vy [m/s], yaw rate [rad/s]) that were given since, in order.
+    """
+
+    def __init__(self, setup: EpisodeSetup) -> None:
+        task = TASKS[setup.task]
+        self._rng = np.random.default_rng(derive_seed("commands", setup.seed))
+        self._draw = task.draw_corner if setup.corners else task.draw_command
+        self._interval_s = setup.command_interval
+        self.given: list[tuple[float, ...]] = []
+        self.options: dict[str, Any] = {"task": setup.task}
+        if setup.command is not None or setup.corners:
+            self.options["command"] = tuple(self._draw(self._rng).tolist()) if setup.command is None else setup.command
+
+    def drive(self, env: gymnasium.Env, step: int) -> None:
+        """Give a command if one is due; a `Watch`."""
+        base = base_env(env)
+        if self._interval_s and step and step % max(1, round(self._interval_s * base.control_hz)) == 0:
+            self.given.append(tuple(self._draw(self._rng).tolist()))
+            base.set_command(self.given[-1])
