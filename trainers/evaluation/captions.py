@@ -127,6 +127,12 @@ class Panel(NamedTuple):
     top: int
     pixels: np.ndarray
 
+    def within(self, width: int, height: int) -> "Panel":
+        """The part of the panel that is in a picture of a size [pixels]."""
+        skipped = (max(0, -self.top), max(0, -self.left))
+        seen = self.pixels[skipped[0] : max(0, height - self.top), skipped[1] : max(0, width - self.left)]
+        return Panel(self.left + skipped[1], self.top + skipped[0], np.ascontiguousarray(seen))
+
     def laid_over(self, beneath: np.ndarray) -> np.ndarray:
         """The panel over a part of a picture that is of its size; RGB, uint8, shape (h, w, 3)."""
         over = Image.alpha_composite(Image.fromarray(beneath).convert("RGBA"), Image.fromarray(self.pixels))
@@ -157,10 +163,11 @@ def lay_over(picture: np.ndarray, drawn: Iterable[Panel]) -> np.ndarray:
     """
     picture = picture.copy()
     height, width, _ = picture.shape
-    for left, top, pixels in drawn:
-        y, x = slice(max(0, top), min(top + pixels.shape[0], height)), slice(max(0, left), left + pixels.shape[1])
-        seen = pixels[y.start - top : y.stop - top, x.start - left : width - left]
-        picture[y, x] = Panel(x.start, y.start, np.ascontiguousarray(seen)).laid_over(picture[y, x])
+    for panel in drawn:
+        left, top, pixels = panel = panel.within(width, height)
+        if pixels.size:
+            place = slice(top, top + pixels.shape[0]), slice(left, left + pixels.shape[1])
+            picture[place] = panel.laid_over(picture[place])
     return picture
 
 

@@ -95,7 +95,7 @@ class DrawnCommands:
         self._rng = np.random.default_rng(derive_seed("commands", setup.seed))
         self._draw = task.draw_corner if setup.corners else task.draw_command
         self._interval_s = setup.command_interval
-        self.given: list[tuple[float, ...]] = []
+        self.given: list[tuple[float, float, float]] = []
         self.options: dict[str, Any] = {"task": setup.task}
         if setup.command is not None or setup.corners:
             self.options["command"] = tuple(self._draw(self._rng).tolist()) if setup.command is None else setup.command
@@ -104,5 +104,6 @@ class DrawnCommands:
         """Give a command if one is due; a `Watch`."""
         base = base_env(env)
         if self._interval_s and step and step % max(1, round(self._interval_s * base.control_hz)) == 0:
-            self.given.append(tuple(self._draw(self._rng).tolist()))
+            forward, sideways, yaw_rate = self._draw(self._rng).tolist()
+            self.given.append((forward, sideways, yaw_rate))
             base.set_command(self.given[-1])

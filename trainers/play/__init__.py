@@ -1,0 +1,1 @@
+"""Driving a policy or the expert: sessions, keys, gamepads, windows, recordings."""

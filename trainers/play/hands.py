@@ -1,0 +1,79 @@
+"""What a player asks for: a stick, buttons for the gaits, and pushes."""
+
+from typing import cast
+
+import gymnasium
+import numpy as np
+
+from go1_mtl_gym import TASKS, Go1Env
+from go1_mtl_gym.validation import finite_vector, number_in, one_of
+
+PUSH_SHARE = 0.5
+"""Of a push, as a share of the largest one that the expert bears in the present gait and that direction."""
+
+
+class Hands:
+    """Holds what was asked for until the next step makes it happen; `drive` is a `Watch`.
+
+    Full deflection of the stick asks for the `command_range` of the gait that was asked for last, which is what
+    policies are trained and certified for.
+    """
+
+    def __init__(self) -> None:
+        self._stick = np.zeros(3)
+        self._task = ""
+        self._pushes: list[tuple[float, float]] = []
+
+    @property
+    def stick(self) -> np.ndarray:
+        """Deflection (forward, left, turn to the left), each in [-1, 1], shape (3,)."""
+        return self._stick.copy()
+
+    def move_stick(self, stick: object) -> None:
+        """Put it somewhere, where it stays; beyond its ends it cannot go.
+
+        Raises:
+            InvalidInputError: if it is not three finite numbers.
+        """
+        self._stick = np.clip(finite_vector(stick, 3, "stick (forward, left, turn)"), -1.0, 1.0)
+
+    def press(self, task: str) -> None:
+        """Press the button of a gait.
+
+        Raises:
+            InvalidInputError: if there is no such gait.
+        """
+        self._task = one_of(task, tuple(TASKS), "gait")
+
+    def push(self, direction_w: float, share: float = PUSH_SHARE) -> None:
+        """Push the robot.
+
+        Args:
+            direction_w: from the world's x axis to the left [rad].
+            share: of the largest push that the expert bears (`Task.largest_push`).
+
+        Raises:
+            InvalidInputError: if a number is none.
+        """
+        self._pushes.append((float(direction_w), number_in(share, 0.0, 3.0, "share of the largest push")))
+
+    def let_go(self) -> None:
+        """Leave the stick to its springs, and forget what was to happen."""
+        self._stick, self._task, self._pushes = np.zeros(3), "", []
+
+    def drive(self, env: gymnasium.Env, step: int) -> None:
+        """Do what was asked for since the step before; a `Watch`.
+
+        Args:
+            env: that is driven.
+            step: number of steps that were made.
+        """
+        go1 = cast(Go1Env, env.unwrapped)
+        if self._task in go1.tasks:
+            go1.set_command((0.0, 0.0, 0.0))  # the old command may be beyond the new task's limit
+            go1.set_task(self._task)
+        go1.set_command(self._stick * np.array(go1.requested_task.command_range))
+        for direction_w, share in self._pushes:
+            size = share * go1.task.largest_push(direction_w - float(go1.state.rpy[2]))
+            go1.push([size * np.cos(direction_w), size * np.sin(direction_w), 0.0])
+        self._task, self._pushes = "", []
