@@ -1,6 +1,7 @@
-"""``python -m trainers certify POLICY --out FOLDER``: find out what a policy can be trusted with.
+"""``python -m trainers``: what is done with a finished policy.
 
-POLICY is the file of a policy, "clocked" or "phase_free" (those in the package), or "expert".
+``play`` drives it, ``certify POLICY --out FOLDER`` finds out what it can be trusted with. A policy is a file, "clocked"
+or "phase_free" (those in the package), or "expert".
 """
 
 import argparse
@@ -17,8 +18,18 @@ QUICK: dict[str, Any] = {"episodes": 4, "seconds": 5.0, "tours": 2, "tour_second
 
 @main
 def run(arguments: Sequence[str] | None = None) -> None:
+    """Do what a command says."""
+    options = parser().parse_args(arguments)
+    if options.command == "play":
+        from trainers.play.program import run as play
+
+        play(options)
+    else:
+        _certify(vars(options))
+
+
+def _certify(given: dict[str, Any]) -> None:
     """Certify a policy, and film what failed."""
-    given = vars(parser().parse_args(arguments))
     given.pop("command")
     out, videos, quick = writable_folder(given.pop("out")), given.pop("video"), given.pop("quick")
     policy, n_jobs, robot = given.pop("policy"), given.pop("jobs"), given.pop("robot")
@@ -38,11 +49,13 @@ def run(arguments: Sequence[str] | None = None) -> None:
 
 
 def parser() -> argparse.ArgumentParser:
-    """The options; None stands for the default of `trainers.certify`."""
+    """The options; None stands for a default, such as that of `trainers.certify`."""
     from trainers.evaluation.conditions import CONDITIONS
+    from trainers.play.program import add_arguments
 
     program = argparse.ArgumentParser(prog="python -m trainers", description="What is done with a finished policy.")
     commands = program.add_subparsers(dest="command", required=True)
+    add_arguments(commands.add_parser("play", help="drive a policy or the expert, in a window or for a film"))
     add = commands.add_parser(
         "certify", help="what a policy can be trusted with, as a JSON file and a page"
     ).add_argument

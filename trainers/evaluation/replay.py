@@ -11,7 +11,9 @@ from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import integer_in
 from trainers.data.environments import EnvFactory, make_env
 from trainers.evaluation.agents import opened
+from trainers.evaluation.cells import Cell
 from trainers.evaluation.certificate import Certificate
+from trainers.evaluation.episodes import EpisodeSetup
 from trainers.evaluation.video import Film, save_gif, tile
 from trainers.utils.validation import positive
 
@@ -56,15 +58,28 @@ def replay(
     elif not isinstance(certificate, Certificate):
         certificate = Certificate.read(certificate)
     seconds, agent = positive(seconds, "seconds"), opened(policy_or_expert)
-    condition, task, number = _parts(episode)
-    cell = certificate.cell(condition, task)
-    integer_in(number, 0, cell.trials - 1, f"number of an episode of {cell.name}")
-    setup = certificate.settings.setup(cell.condition, cell.task, number)
+    cell, number, setup = certified_episode(certificate, episode)
     failed_s = {each.number: each.cause.time_s for each in cell.failures}.get(number, seconds)
     film = Film(width, height, fps, max(0.0, failed_s - seconds))
     kwargs = {**certificate.settings.arguments(agent, cell.condition), **film.env_kwargs}
     setup.play(agent, kwargs, make_env, film)
     return tile({episode: film.frames(max(1, round((min(failed_s, seconds) + AFTERMATH_S) * fps)))})
+
+
+def certified_episode(certificate: Certificate, episode: str) -> tuple[Cell, int, EpisodeSetup]:
+    """An episode of a certificate: its cell, its number, and all that it depends on besides who drives.
+
+    Args:
+        certificate: whose.
+        episode: as in `replay`.
+
+    Raises:
+        InvalidInputError: if there is none.
+    """
+    condition, task, number = _parts(episode)
+    cell = certificate.cell(condition, task)
+    integer_in(number, 0, cell.trials - 1, f"number of an episode of {cell.name}")
+    return cell, number, certificate.settings.setup(cell.condition, cell.task, number)
 
 
 def film_failures(certificate: Certificate, policy_or_expert: Any, folder: Path, count: int, fps: int = 25) -> None:

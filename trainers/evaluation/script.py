@@ -1,15 +1,21 @@
 """What a person does with a stick and gait buttons, written down: the same moves for every policy."""
 
 import dataclasses
+import json
 from collections.abc import Mapping, Sequence
-from typing import Any
+from os import PathLike
+from pathlib import Path
+from typing import Any, cast
 
 import gymnasium
+import numpy as np
 
-from go1_mtl_gym import TASKS
+from go1_mtl_gym import TASKS, Go1Env
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.validation import number_in, one_of, parameters_of
+from go1_mtl_gym.rotations import yaw_matrix
+from go1_mtl_gym.validation import finite_vector, number_in, one_of, parameters_of
 from trainers.data.environments import base_env
+from trainers.utils.files import write_json
 
 LONGEST_S = 600.0
 
@@ -22,6 +28,7 @@ class Move:
         time_s: when, since the start [s].
         task: name of the gait that is asked for, one of `go1_mtl_gym.TASKS`; the same as before changes nothing.
         command: (vx [m/s], vy [m/s], yaw rate [rad/s]), within the task's `command_limit`.
+        push: a change of the trunk's velocity (forward, left) that comes with it [m/s], heading frame; or None.
 
     Raises:
         InvalidInputError: if a value is not as described.
@@ -30,6 +37,7 @@ class Move:
     time_s: float
     task: str
     command: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    push: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         time_s = number_in(self.time_s, 0.0, LONGEST_S, "time_s of a move [s]")
@@ -38,6 +46,9 @@ class Move:
             command = task.check_command(self.command)
         except InvalidInputError as error:
             raise InvalidInputError(f"move at {time_s:g} s: {error}") from error
+        if self.push is not None:
+            push = finite_vector(self.push, 2, f"push of the move at {time_s:g} s")
+            object.__setattr__(self, "push", tuple(push.tolist()))
         object.__setattr__(self, "time_s", time_s)
         object.__setattr__(self, "command", tuple(command.tolist()))
 
@@ -89,11 +100,39 @@ class Script:
             step: number of steps that were made.
         """
         base = base_env(env)
-        for move in self.moves[1:]:
+        for move in self.moves:
             if round(move.time_s * base.control_hz) == step:
-                base.set_command((0.0, 0.0, 0.0))  # the old command may be beyond the new task's limit
-                base.set_task(move.task)
-                base.set_command(move.command)
+                if move is not self.moves[0]:
+                    base.set_command((0.0, 0.0, 0.0))  # the old command may be beyond the new task's limit
+                    base.set_task(move.task)
+                    base.set_command(move.command)
+                if move.push is not None:
+                    push(env, move.push)
+
+    @classmethod
+    def read(cls, path: str | PathLike[str]) -> "Script":
+        """From a JSON file.
+
+        Raises:
+            InvalidInputError: if there is no such file, or it holds something else.
+        """
+        try:
+            values = json.loads(Path(path).read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise InvalidInputError(f"{str(path)!r} is no script: {error}") from error
+        if not isinstance(values, dict) or not {"moves", "seconds"} <= set(values):
+            raise InvalidInputError(f"{str(path)!r} is no script: an object with moves and seconds was expected")
+        return parameters_of(values, cls, f"the script {str(path)!r}")
+
+    def write(self, path: str | PathLike[str]) -> None:
+        """As a JSON file."""
+        write_json(path, dataclasses.asdict(self))
+
+
+def push(env: gymnasium.Env, change: Sequence[float]) -> None:
+    """Push a robot: change its velocity (forward, left) [m/s], heading frame."""
+    go1 = cast(Go1Env, env.unwrapped)
+    go1.push(np.append(yaw_matrix(go1.state.rpy[2]) @ np.asarray(change), 0.0))
 
 
 def _move(value: Any) -> Move:

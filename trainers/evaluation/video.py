@@ -124,7 +124,11 @@ class Film:
 
 def _picture(env: gymnasium.Env) -> np.ndarray:
     """What the environment draws, in half the size in both directions."""
-    picture = cast(np.ndarray, env.render())  # Gymnasium's annotation leaves open what it is
+    return halved(cast(np.ndarray, env.render()))  # Gymnasium's annotation leaves open what it is
+
+
+def halved(picture: np.ndarray) -> np.ndarray:
+    """A picture in half the size in both directions, uint8, shape (h, w, 3) of (2 h, 2 w, 3)."""
     height, width, _ = picture.shape
     blocks = picture.reshape(height // 2, 2, width // 2, 2, 3).astype(np.uint16)
     return ((blocks.sum((1, 3)) + 2) // 4).astype(np.uint8)

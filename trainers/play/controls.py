@@ -53,7 +53,7 @@ class Controls:
         self._player = player
         self._held: dict[str, None] = {}
         self._analog = np.zeros(3)
-        self._presses: dict[str, Callable[[], object]] = {
+        presses: dict[str, Callable[[], object]] = {
             "SPACE": self._pause,
             "N": self._one_step,
             "MINUS": player.slower,
@@ -65,7 +65,10 @@ class Controls:
             "P": self.push,
             "H": self._help,
             "ESCAPE": self._quit,
-        } | {str(i): functools.partial(self.choose, task) for i, task in enumerate(player.session.go1.tasks, 1)}
+        }
+        for number, task in enumerate(player.session.go1.tasks, 1):
+            presses[str(number)] = functools.partial(self.choose, task)
+        self._presses = presses
 
     def key(self, name: str, down: bool) -> None:
         """A key went down, or up; a key that does nothing does nothing.

@@ -7,6 +7,7 @@ import numpy as np
 
 from go1_mtl_gym import TASKS, Go1Env
 from go1_mtl_gym.validation import finite_vector, number_in, one_of
+from trainers.evaluation.script import Move, Script, push
 
 PUSH_SHARE = 0.5
 """Of a push, as a share of the largest one that the expert bears in the present gait and that direction."""
@@ -23,6 +24,17 @@ class Hands:
         self._stick = np.zeros(3)
         self._task = ""
         self._pushes: list[tuple[float, float]] = []
+        self._moves: list[Move] = []
+        self._seconds = 0.0
+
+    @property
+    def script(self) -> Script:
+        """What was done since the last reset: who begins with the same seed and drives by it goes the same way.
+
+        Raises:
+            InvalidInputError: if nothing was driven yet.
+        """
+        return Script(tuple(self._moves), self._seconds)
 
     @property
     def stick(self) -> np.ndarray:
@@ -72,8 +84,25 @@ class Hands:
         if self._task in go1.tasks:
             go1.set_command((0.0, 0.0, 0.0))  # the old command may be beyond the new task's limit
             go1.set_task(self._task)
-        go1.set_command(self._stick * np.array(go1.requested_task.command_range))
+        command = self._stick * np.array(go1.requested_task.command_range)
+        go1.set_command(command)
+        yaw, change = float(go1.state.rpy[2]), np.zeros(2)
         for direction_w, share in self._pushes:
-            size = share * go1.task.largest_push(direction_w - float(go1.state.rpy[2]))
-            go1.push([size * np.cos(direction_w), size * np.sin(direction_w), 0.0])
+            angle = direction_w - yaw
+            change += share * go1.task.largest_push(angle) * np.array([np.cos(angle), np.sin(angle)])
+        if change.any():
+            push(env, change.tolist())
         self._task, self._pushes = "", []
+        self._write_down(step, go1, command, change)
+
+    def _write_down(self, step: int, go1: Go1Env, command: np.ndarray, change: np.ndarray) -> None:
+        """Remember what was done, if it differs from what was done before."""
+        if step == 0:
+            self._moves = []
+        forward, left, turn = command.tolist()
+        pushed = (float(change[0]), float(change[1])) if change.any() else None
+        move = Move(step * go1.control_s, go1.requested_task.name, (forward, left, turn), pushed)
+        last = self._moves[-1] if self._moves else None
+        if last is None or pushed or (last.task, last.command) != (move.task, move.command):
+            self._moves.append(move)
+        self._seconds = (step + 1) * go1.control_s

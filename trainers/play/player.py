@@ -90,12 +90,10 @@ class Player:
         return 1
 
     def reset(self) -> None:
-        """Stand the robot up again, in the gait that was asked for last."""
-        task = self.session.go1.requested_task.name
-        self.session.reset()
+        """Begin again: hands in the gait that they asked for last, anything else as it began."""
+        driven = self.hands is not None
+        self.session.reset(self.session.go1.requested_task.name if driven else None)
         self._lying_s = 0.0
-        if self.hands is not None and task != self.session.go1.task.name:
-            self.hands.press(task)
         self.look()
 
     def look(self) -> None:

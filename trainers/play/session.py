@@ -1,6 +1,7 @@
 """An episode that somebody drives, step by step. No window, no clock on the wall, no keys."""
 
 import contextlib
+import dataclasses
 from collections import deque
 from collections.abc import Callable
 from typing import Any, cast
@@ -26,7 +27,7 @@ class Session:
     whoever looks on. The student is asked at every step, so that one with a memory has followed when it takes over.
 
     Args:
-        student: a policy.
+        student: a policy; None leaves all to the expert.
         setup: of the episodes.
         drive: gives commands before each step, such as `Hands.drive` or `Script.drive`; None leaves that to the setup.
         expert_drives: who begins.
@@ -35,7 +36,6 @@ class Session:
 
     Attributes:
         env: in the hands of the setup's operator, if it has one.
-        expert_drives: whether the expert is at the joints; may be changed at any time.
         steps: that were made in this episode.
         ended: how it ended, "fall", "unstable" or "time"; "" while it goes on.
 
@@ -59,7 +59,7 @@ class Session:
         one_of(setup.task, tuple(kwargs.get("tasks", (setup.task,))), "task")
         env = self._resources.enter_context(opened(make_env, setup.task, kwargs))
         self.env: gymnasium.Env = setup.in_hands(env)
-        self.expert_drives = expert_drives
+        self._expert_drives = expert_drives
         self.go1 = cast(Go1Env, env.unwrapped)
         self._told: deque[dict[str, Any]] = deque(maxlen=round(STRIP_S * self.go1.control_hz))
         self._expert_known = False
@@ -75,11 +75,21 @@ class Session:
         """Close the environment; may be called twice."""
         self._resources.close()
 
-    def reset(self) -> None:
-        """Begin the episode again, from its stand and its seed."""
+    def reset(self, task: str | None = None) -> None:
+        """Begin the episode again, from its stand and its seed.
+
+        Args:
+            task: to begin in, another than the setup's; None keeps it.
+
+        Raises:
+            InvalidInputError: if it is unknown here.
+        """
+        if task is not None:
+            self._setup = dataclasses.replace(self._setup, task=one_of(task, self.go1.tasks, "task"))
         self._commands = DrawnCommands(self._setup)
-        self._ask_student: Callable[[np.ndarray], np.ndarray] = controller(self._student, self.go1)
-        self._obs, info = begin(self.env, self._student, self._setup.seed, self._commands.options)
+        agent = EXPERT if self._student is None else self._student
+        self._ask_student: Callable[[np.ndarray], np.ndarray] = controller(agent, self.go1)  # with an empty memory
+        self._obs, info = begin(self.env, agent, self._setup.seed, self._commands.options)
         self._told.clear()
         self._told.append(info)
         self._expert_action: np.ndarray | None = None
@@ -97,8 +107,8 @@ class Session:
             self._drive(self.env, self.steps)
         self._commands.drive(self.env, self.steps)
         self._expert_action = None  # it was asked under another command
-        action = self._ask_student(self._obs)
-        if self.expert_drives:
+        action = self._ask_student(self._obs) if self._student is not None else None
+        if self.expert_drives or action is None:
             action = self._ask_expert()
         self._obs, _, _, _, info = self.env.step(action)
         self._told.append(info)
@@ -122,6 +132,15 @@ class Session:
             self._expert_action = self.go1.expert_action()
             self._expert_known = True
         return self._expert_action
+
+    @property
+    def expert_drives(self) -> bool:
+        """Whether the expert is at the joints; may be changed at any time where there is a student."""
+        return self._expert_drives or self._student is None
+
+    @expert_drives.setter
+    def expert_drives(self, wanted: bool) -> None:
+        self._expert_drives = wanted
 
     # -- What there is to see ------------------------------------------------------------------------------------------
 
