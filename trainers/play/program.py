@@ -125,8 +125,8 @@ def _replayed(file: str, episode: str, named: str | None) -> tuple[Session, None
 
 def _film(player: Player, film: FilmFile, size: tuple[int, int]) -> None:
     print(f"filming {film.path}", file=sys.stderr)
-    with tqdm(total=round(player.session.go1.config.episode_s, 1), unit="s", leave=False) as bar:
-        record(player, film, *size, progress=lambda seconds: bar.update(round(seconds - bar.n, 3)))
+    with tqdm(total=player.session.go1.config.episode_steps, unit="step", leave=False) as bar:
+        record(player, film, *size, progress=lambda steps: bar.update(steps - bar.n))
     print(f"{film.path} has {film.count} pictures")
 
 

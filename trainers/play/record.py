@@ -179,7 +179,7 @@ class OffScreen:
 
 
 def record(
-    player: Player, film: FilmFile, width: int, height: int, progress: Callable[[float], object] = lambda s: None
+    player: Player, film: FilmFile, width: int, height: int, progress: Callable[[int], object] = lambda steps: None
 ) -> None:
     """Film a player until it is over, as fast as the machine can.
 
@@ -188,7 +188,7 @@ def record(
         film: is closed in the end.
         width: of a picture [pixels].
         height: likewise.
-        progress: is told the time that was played [s].
+        progress: is told the number of steps that were made.
 
     Raises:
         go1_mtl_gym.rendering.RenderingError: if no picture can be drawn on this machine.
@@ -200,7 +200,7 @@ def record(
         while not (player.over or film.is_full):
             player.step()
             recording()
-            progress(player.session.time_s)
+            progress(player.session.steps)
         film.close()
     finally:
         film.discard()
