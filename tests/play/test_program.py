@@ -1,0 +1,130 @@
+"""The command line, films, and what is refused in a sentence."""
+
+import json
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import trainers
+from go1_mtl_gym.errors import InvalidInputError
+from trainers.__main__ import run
+from trainers.play.record import FilmFile
+
+SCRIPT = {"seconds": 0.4, "moves": [[0.0, "trot"], [0.1, "walk", [0.3, 0.0, 0.0]]]}
+
+
+@pytest.fixture
+def script(tmp_path):
+    path = tmp_path / "script.json"
+    path.write_text(json.dumps(SCRIPT))
+    return str(path)
+
+
+def picture(value: int, width: int = 64, height: int = 48) -> np.ndarray:
+    return np.full((height, width, 3), value, np.uint8)
+
+
+@pytest.mark.parametrize("kind", ["gif", "webp", "mp4"])
+def test_a_film_grows_and_is_whole_or_not_there(tmp_path, kind):
+    if kind == "mp4":
+        pytest.importorskip("imageio_ffmpeg")
+    path = tmp_path / "new" / f"x.{kind}"
+    film = FilmFile(path, fps=10)
+    for value in (0, 50, 100, 150):
+        film.add(picture(value))
+    film.add(picture(250, 131, 97))  # the window's size was changed
+    assert film.count == 5 and not path.exists()
+    film.close()
+    film.discard()
+    assert [each.name for each in path.parent.iterdir()] == [path.name]
+    if kind == "mp4":
+        import imageio_ffmpeg
+
+        assert imageio_ffmpeg.count_frames_and_secs(str(path)) == (5, pytest.approx(0.5))
+    else:
+        with Image.open(path) as image:
+            assert image.size == (64, 48) and image.n_frames == 5
+    film = FilmFile(tmp_path / f"y.{kind}")
+    film.add(picture(0))
+    film.discard()
+    film.close()
+    assert not list(tmp_path.glob("*y.*"))
+
+
+def test_a_film_that_waits_in_memory_is_full_after_a_minute(tmp_path):
+    film = FilmFile(tmp_path / "x.gif", fps=1)
+    for _ in range(70):
+        film.add(picture(1, 16, 16))
+    assert film.is_full and film.count == 60
+
+
+def test_films_of_other_kinds_are_refused(tmp_path):
+    with pytest.raises(InvalidInputError, match=r"'.mp4', '.gif', '.webp'; got '.avi'"):
+        FilmFile(tmp_path / "x.avi")
+
+
+def test_mp4_without_its_library_says_what_to_do(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    with pytest.raises(InvalidInputError, match=r"pip install go1-mtl-gym\[video\]"):
+        FilmFile(tmp_path / "x.mp4")
+
+
+@pytest.mark.gl
+def test_a_script_is_filmed_without_a_window(script, tmp_path, capsys):
+    film = tmp_path / "x.gif"
+    command = ["play", "--script", script, "--record", str(film), "--size", "128", "72", "--fps", "10"]
+    assert run(command) == 0
+    assert f"{film} has 5 pictures" in capsys.readouterr().out
+    with Image.open(film) as image:
+        assert image.size == (128, 72) and image.n_frames == 5
+
+
+@pytest.mark.gl
+def test_an_episode_of_a_certificate_is_filmed(tmp_path, capsys):
+    out = tmp_path / "certificate"
+    trainers.certify("clocked", out, tasks=("walk",), conditions=("drawn",), episodes=1, seconds=0.2)
+    film = tmp_path / "x.webp"
+    asked = ["play", "--replay", str(out), "--episode", "drawn/walk/0", "--size", "96", "64", "--fps", "10"]
+    assert run([*asked, "--record", str(film)]) == 0
+    with Image.open(film) as image:
+        assert image.n_frames == 3
+    assert run(["play", "--replay", str(out), "--episode", "drawn/walk/9"]) == 2
+    assert "number of an episode of drawn/walk" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--policy", "nothing.zip"], "nothing.zip"),
+        (["--task", "hop"], "gait must be one of 'trot'"),
+        (["--script", "nothing.json"], "is no script"),
+        (["--replay", "nothing.json"], "belong together"),
+        (["--episode", "operator/trot/1"], "belong together"),
+        (["--replay", "nothing.json", "--episode", "operator/trot/1"], "is no certificate"),
+        (["--record", "x.avi"], "ending of the film"),
+        (["--script", "a.json", "--replay", "b", "--episode", "c/d/1"], "one thing can drive"),
+        (["--script", "a.json", "--task", "trot"], "--script says everything; beside it came --task"),
+        (["--script", "a.json", "--save-script", "b.json"], "beside it came --save-script"),
+        (["--seed", "-1"], "seed"),
+    ],
+)
+def test_what_cannot_be_done_is_one_sentence(options, message, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert run(["play", *options]) == 2
+    error = capsys.readouterr().err
+    assert message in error and error.startswith("error: ") and error.count("\n") == 1
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems always have a display")
+@pytest.mark.parametrize(("display", "message"), [(None, "there is no display"), (":9999", "cannot open a window")])
+def test_without_a_display_the_sentence_says_what_to_do(display, message):
+    environment = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    environment |= {"PYTHONPATH": os.pathsep.join(sys.path)} | ({} if display is None else {"DISPLAY": display})
+    command = [sys.executable, "-m", "trainers", "play"]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 2 and "Traceback" not in done.stderr
+    assert message in done.stderr and "--record FILE.webp" in done.stderr
