@@ -63,7 +63,7 @@ def test_a_film_that_waits_in_memory_is_full_after_a_minute(tmp_path):
 
 
 def test_films_of_other_kinds_are_refused(tmp_path):
-    with pytest.raises(InvalidInputError, match=r"'.mp4', '.gif', '.webp'; got '.avi'"):
+    with pytest.raises(InvalidInputError, match=r"'.mp4', '.gif', '.webp', '.png'; got '.avi'"):
         FilmFile(tmp_path / "x.avi")
 
 
@@ -81,6 +81,18 @@ def test_a_script_is_filmed_without_a_window(script, tmp_path, capsys):
     assert f"{film} has 5 pictures" in capsys.readouterr().out
     with Image.open(film) as image:
         assert image.size == (128, 72) and image.n_frames == 5
+
+
+@pytest.mark.gl
+def test_a_picture_of_the_end_is_one_of_the_film(script, tmp_path, capsys):
+    how = ["--size", "128", "72", "--fps", "10"]
+    assert run(["play", "--script", script, "--record", str(tmp_path / "x.png"), *how]) == 0
+    assert f"{tmp_path / 'x.png'} is there" in capsys.readouterr().out
+    assert run(["play", "--script", script, "--record", str(tmp_path / "x.webp"), *how]) == 0
+    with Image.open(tmp_path / "x.png") as last, Image.open(tmp_path / "x.webp") as film:
+        film.seek(4)
+        difference = np.asarray(last.convert("RGB")).astype(int) - np.asarray(film.convert("RGB"))
+    assert np.abs(difference).mean() < 6
 
 
 @pytest.mark.gl

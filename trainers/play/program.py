@@ -23,13 +23,14 @@ from trainers.play.record import FilmFile, Recording, record
 from trainers.play.session import EXPERT, Session
 from trainers.policies.pretrained import PRETRAINED
 from trainers.utils.cli import positive_int, writable_file
+from trainers.utils.validation import checked_seed
 
 ENDLESS_S = 1e6
 """Length of an episode that hands drive [s]."""
 STAND = (0.0, 0.0, 0.0)
 SEED = 1
-FILM_SIZE, FILM_SIZE_MP4 = (640, 360), (1280, 720)
-"""Width and height of a film without a window [pixels]."""
+FILM_SIZE, LARGE_FILM_SIZE = (640, 360), (1280, 720)
+"""Width and height of a film without a window [pixels]: one that waits in memory until its end, and any other."""
 
 
 def add_arguments(program: argparse.ArgumentParser) -> None:
@@ -42,7 +43,12 @@ def add_arguments(program: argparse.ArgumentParser) -> None:
     add("--save-script", metavar="FILE", help="write down what you do, since the last reset, as such a file")
     add("--replay", metavar="FILE", help="certificate.json or its folder: one of its episodes drives instead of you")
     add("--episode", metavar="NAME", help='which of them, such as "operator/trot/17"')
-    add("--record", metavar="FILE", help="film it: .mp4, .gif or .webp; a script or replay is filmed without a window")
+    add(
+        "--record",
+        metavar="FILE",
+        help="film it: .mp4, .gif, .webp, or .png for the last picture; scripts and replays without a window",
+    )
+    add("--ghost", action="store_true", help="show the pose that the expert asks for")
     add("--size", type=positive_int, nargs=2, metavar=("WIDTH", "HEIGHT"), help="of window or film [pixels]")
     add("--fps", type=positive_int, default=25, help="pictures per second of the film (default: 25)")
 
@@ -62,8 +68,9 @@ def run(options: argparse.Namespace) -> None:
     session, hands, title = _session(options)
     with session:
         player = Player(session, hands, stands_up=hands is not None, title=title)
+        player.ghost = options.ghost
         if film is not None and hands is None:
-            _film(player, film, options.size or (FILM_SIZE_MP4 if film.path.suffix == ".mp4" else FILM_SIZE))
+            _film(player, film, options.size or (FILM_SIZE if film.waits else LARGE_FILM_SIZE))
         else:
             _play(player, film, options.size or (1280, 720))
     if tape is not None and hands is not None and session.steps:
@@ -96,7 +103,7 @@ def _session(options: argparse.Namespace) -> tuple[Session, Hands | None, str]:
         return _replayed(options.replay, options.episode, options.policy)
     named = options.policy or PRETRAINED[0]
     student = opened(PRETRAINED[0] if named == EXPERT else named)
-    seed = SEED if options.seed is None else options.seed
+    seed = SEED if options.seed is None else checked_seed(options.seed)
     who: dict[str, Any] = {"expert_drives": named == EXPERT}
     if options.script is not None:
         script = options.script if isinstance(options.script, Script) else Script.read(options.script)
@@ -127,7 +134,7 @@ def _film(player: Player, film: FilmFile, size: tuple[int, int]) -> None:
     print(f"filming {film.path}", file=sys.stderr)
     with tqdm(total=player.session.go1.config.episode_steps, unit="step", leave=False) as bar:
         record(player, film, *size, progress=lambda steps: bar.update(steps - bar.n))
-    print(f"{film.path} has {film.count} pictures")
+    print(film.summary)
 
 
 def _play(player: Player, film: FilmFile | None, size: tuple[int, int]) -> None:
@@ -137,8 +144,10 @@ def _play(player: Player, film: FilmFile | None, size: tuple[int, int]) -> None:
     try:
         window.run(each=Recording(player, film, window.picture) if film is not None else lambda: None)
         if film is not None:
+            if film.is_still:
+                film.add(window.picture())
             film.close()
-            print(f"{film.path} has {film.count} pictures")
+            print(film.summary)
     finally:
         if film is not None:
             film.discard()

@@ -1,4 +1,4 @@
-"""Films of what is played: MP4 as it comes, GIF and WebP at the end."""
+"""Films of what is played: MP4 as it comes, GIF and WebP at the end; and pictures of how it ended."""
 
 import math
 import os
@@ -18,8 +18,9 @@ from trainers.evaluation.video import MAX_FPS, SHADOW_PIXELS, halved, save_gif, 
 from trainers.play.player import Player
 from trainers.play.scene import Ghost, furnish
 from trainers.play.status import play_panels
+from trainers.utils.files import write_atomically
 
-KINDS = (".mp4", ".gif", ".webp")
+KINDS = (".mp4", ".gif", ".webp", ".png")
 LONGEST_S = 60.0
 """Of a GIF or WebP, whose pictures wait in memory until the end [s]."""
 WEBP_QUALITY = 40
@@ -50,9 +51,24 @@ class FilmFile:
         self.count = 0
 
     @property
+    def is_still(self) -> bool:
+        """Whether only the last picture counts."""
+        return self._kind == ".png"
+
+    @property
+    def waits(self) -> bool:
+        """Whether all pictures are kept in memory until the end."""
+        return self._kind in (".gif", ".webp")
+
+    @property
+    def summary(self) -> str:
+        """What there is in the file, in a sentence."""
+        return f"{self.path} is there" if self.is_still else f"{self.path} has {self.count} pictures"
+
+    @property
     def is_full(self) -> bool:
         """Whether no more pictures are taken."""
-        return self._kind != ".mp4" and self.count >= LONGEST_S * self.fps
+        return self.waits and self.count >= LONGEST_S * self.fps
 
     def add(self, picture: np.ndarray) -> None:
         """Take in the next picture, RGB, uint8, shape (h, w, 3); all become as large as the first one."""
@@ -66,6 +82,8 @@ class FilmFile:
         picture = np.ascontiguousarray(picture[:height, :width])
         self.count += 1
         if self._kind != ".mp4":
+            if self.is_still:
+                self._pictures.clear()
             self._pictures.append(picture)
             return
         if self._encoder is None:
@@ -88,7 +106,10 @@ class FilmFile:
             os.replace(self._unfinished, self.path)
         elif self._pictures:
             frames, self._pictures = np.stack(self._pictures), []
-            if self._kind == ".gif":
+            if self.is_still:
+                last = Image.fromarray(frames[-1])
+                write_atomically(self.path, lambda file: last.save(file, format="PNG", optimize=True))
+            elif self._kind == ".gif":
                 save_gif(frames, self.path, self.fps)
             else:
                 save_webp(frames, self.path, self.fps, WEBP_QUALITY)
@@ -118,7 +139,7 @@ class Recording:
 
     Args:
         player: that is filmed; its `played_s` is the film's time.
-        film: where the pictures go.
+        film: where the pictures go, but for one of which only the last counts.
         picture: what makes one.
     """
 
@@ -127,6 +148,8 @@ class Recording:
 
     def __call__(self) -> None:
         """Take a picture if one is due; where the player went on for longer, the same one several times."""
+        if self._film.is_still:
+            return
         due = math.floor(self._player.played_s * self._film.fps + 1e-6) + 1 - self._film.count
         if due > 0 and not self._film.is_full:
             picture = self._picture()
@@ -201,6 +224,8 @@ def record(
             player.step()
             recording()
             progress(player.session.steps)
+        if film.is_still:
+            film.add(off_screen.picture())
         film.close()
     finally:
         film.discard()
