@@ -188,13 +188,13 @@ class OffScreen:
             ) from error
 
     def picture(self) -> np.ndarray:
-        """RGB, uint8, shape (height, width, 3)."""
+        """RGB, uint8, shape (height, width, 3); nothing is said of keys, which nobody has."""
         player, renderer = self._player, self._renderer
         if player.ghost and self._ghost is None:
             self._ghost = Ghost(player.session)
         renderer.update_scene(player.session.go1.simulation.data, camera=player.camera.mjv)
         furnish(renderer.scene, player.session, self._ghost if player.ghost else None)
-        return lay_over(halved(renderer.render()), play_panels(self._size, player))
+        return lay_over(halved(renderer.render()), play_panels(self._size, player, player.title))
 
     def close(self) -> None:
         """Free the OpenGL context."""

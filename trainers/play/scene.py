@@ -22,6 +22,7 @@ class Ghost:
         model = session.go1.simulation.model
         self._data = mujoco.MjData(model)
         self._joints = [model.joint(name).qposadr[0] for name in robot.JOINTS]
+        self._trunk = model.body("trunk").id
         self._option = mujoco.MjvOption()
 
     def add_to(self, scene: mujoco.MjvScene) -> None:
@@ -35,7 +36,8 @@ class Ghost:
         dynamic = mujoco.mjtCatBit.mjCAT_DYNAMIC
         mujoco.mjv_addGeoms(model, self._data, self._option, mujoco.MjvPerturb(), dynamic, scene)
         for geom in scene.geoms[before : scene.ngeom]:
-            geom.rgba[:] = np.array(GHOST_COLOR, np.float32)
+            in_trunk = model.geom_bodyid[geom.objid] == self._trunk  # where both robots are alike
+            geom.rgba[:] = np.zeros(4) if in_trunk else np.array(GHOST_COLOR)
             geom.matid = -1
 
 

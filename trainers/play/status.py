@@ -25,17 +25,17 @@ HELP_WIDTH = 312.0
 EXPERT_COLOR = (255, 196, 84, 255)
 
 
-def play_panels(size: tuple[int, int], player: Player, notice: str = "") -> list[Panel]:
+def play_panels(size: tuple[int, int], player: Player, notice: str | None = None) -> list[Panel]:
     """Everything that is written into a picture.
 
     Args:
         size: width and height of the picture [pixels].
         player: that is shown.
-        notice: a line of text that matters more than what would stand there.
+        notice: a line of text, in place of what a person with keys is to be told; "" is none.
     """
     page = Page(*size)
     drawn = [*panels(size, player.session.reading), _status(page, player)]
-    notice = notice or _notice(player)
+    notice = _notice(player) if notice is None else notice
     if notice:
         drawn.append(_line(page, notice))
     if player.help:

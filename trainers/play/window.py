@@ -125,24 +125,24 @@ class Window:
         width, height = self._glfw.get_framebuffer_size(self._window)
         return width, height
 
-    def draw(self, notice: str = "") -> None:
+    def draw(self, notice: str | None = None) -> None:
         """Show the present state.
 
         Args:
-            notice: a line of text that matters more than what would stand there.
+            notice: a line of text, in place of the one that would stand there.
         """
         self._paint(notice)
         self._glfw.swap_buffers(self._window)
 
     def picture(self) -> np.ndarray:
         """What `draw` shows; RGB, uint8, shape (height, width, 3)."""
-        self._paint("")
+        self._paint()
         width, height = self.size
         pixels = np.empty((height, width, 3), np.uint8)
         mujoco.mjr_readPixels(pixels, None, mujoco.MjrRect(0, 0, width, height), self._context)
         return pixels[::-1]  # OpenGL's rows run upward
 
-    def _paint(self, notice: str) -> None:
+    def _paint(self, notice: str | None = None) -> None:
         """Draw into the buffer that is shown next."""
         width, height = self.size
         if not width or not height:  # it was made an icon
@@ -159,7 +159,7 @@ class Window:
         mujoco.mjr_render(mujoco.MjrRect(0, 0, width, height), self._scene, self._context)
         self._write(width, height, notice)
 
-    def _write(self, width: int, height: int, notice: str) -> None:
+    def _write(self, width: int, height: int, notice: str | None) -> None:
         """Lay the panels over what was drawn."""
         now = time.perf_counter()
         if notice or now - self._panels_s >= 1.0 / CAPTIONS_HZ:
