@@ -1,6 +1,7 @@
 """Sessions and hands: the same episodes as without a player, and what a player asks for."""
 
 import dataclasses
+import time
 
 import numpy as np
 import pytest
@@ -219,3 +220,14 @@ def test_a_robot_that_fell_may_be_watched_and_one_whose_time_is_up_may_not():
 def test_a_gait_that_the_policy_does_not_have_is_refused(student):
     with pytest.raises(InvalidInputError, match="'hop'"):
         Session(student, dataclasses.replace(STANDING, task="hop"))
+
+
+def test_a_second_of_the_robot_takes_less_than_a_second_of_one_core(student):
+    hands = Hands()
+    hands.move_stick((1.0, 0.0, 0.5))
+    with Session(student, STANDING, hands.drive) as session:
+        session.step()
+        began = time.process_time()
+        for _ in range(100):
+            session.step()
+        assert time.process_time() - began < 2.0 * 0.5, "half of a core draws"

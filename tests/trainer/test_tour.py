@@ -47,9 +47,10 @@ def test_a_script_is_read_from_tuples_dictionaries_and_json():
         (((-1.0, "trot"),), 1.0, "time_s of a move"),
         (((0.0, "walk", (1.5, 0.0, 0.0)),), 1.0, "move at 0 s: command .* for task 'walk' must lie within"),
         (((0.0, "walk", (0.5, 0.0)),), 1.0, "move at 0 s: command .* must have shape"),
-        (((0.0,),), 1.0, r"a move is \(time_s, task, command\), got \(0.0,\)"),
+        (((0.0,),), 1.0, r"a move is \(time_s, task, command, push\), got \(0.0,\)"),
         (({"time_s": 0.0},), 1.0, "needs time_s and task"),
         (({"time_s": 0.0, "task": "trot", "speed": 1.0},), 1.0, "field of a move"),
+        (((0.0, "walk", STAND, (0.5,)),), 1.0, "push of the move at 0 s must have shape"),
         ((None,), 1.0, "a move must be a Move, got None"),
     ],
 )

@@ -22,7 +22,8 @@ class Ghost:
         model = session.go1.simulation.model
         self._data = mujoco.MjData(model)
         self._joints = [model.joint(name).qposadr[0] for name in robot.JOINTS]
-        self._trunk = model.body("trunk").id
+        trunk = model.body("trunk").id
+        self._alike = {trunk, *np.flatnonzero(model.body_parentid == trunk)}  # with the hips, which hardly turn
         self._option = mujoco.MjvOption()
 
     def add_to(self, scene: mujoco.MjvScene) -> None:
@@ -36,8 +37,8 @@ class Ghost:
         dynamic = mujoco.mjtCatBit.mjCAT_DYNAMIC
         mujoco.mjv_addGeoms(model, self._data, self._option, mujoco.MjvPerturb(), dynamic, scene)
         for geom in scene.geoms[before : scene.ngeom]:
-            in_trunk = model.geom_bodyid[geom.objid] == self._trunk  # where both robots are alike
-            geom.rgba[:] = np.zeros(4) if in_trunk else np.array(GHOST_COLOR)
+            alike = model.geom_bodyid[geom.objid] in self._alike  # would flicker in the robot's own surface
+            geom.rgba[:] = np.zeros(4) if alike else np.array(GHOST_COLOR)
             geom.matid = -1
 
 
