@@ -6,11 +6,11 @@ Importing the package registers ``Go1Trot-v0``, ``Go1Bound-v0``, ``Go1Jump-v0``,
 """
 
 from importlib.metadata import PackageNotFoundError, version
+from typing import TYPE_CHECKING, Any
 
 from go1_mtl_gym import _moved
 from go1_mtl_gym.actuation import PDGains
 from go1_mtl_gym.contract import PolicyContract
-from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.env_config import EnvConfig
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
 from go1_mtl_gym.gaits import GAITS, Gait
@@ -25,6 +25,9 @@ from go1_mtl_gym.sim.domain_randomization import DomainRandomization
 from go1_mtl_gym.sim.physics_params import PhysicsParams
 from go1_mtl_gym.tasks import BUILT_IN_TASKS, PAPER_TASKS, TASKS, Task
 from go1_mtl_gym.wrappers import PerturbationWrapper
+
+if TYPE_CHECKING:
+    from go1_mtl_gym.env import Go1Env
 
 __all__ = [
     "GAITS",
@@ -60,3 +63,17 @@ except PackageNotFoundError:  # a source tree that was not installed
 
 _moved.install()
 register_built_in()
+
+
+def __getattr__(name: str) -> Any:
+    """Import the environment on first use: whoever only asks what there is does not wait for MuJoCo."""
+    if name == "Go1Env":
+        from go1_mtl_gym.env import Go1Env
+
+        globals()[name] = Go1Env
+        return Go1Env
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(set(globals()) | set(__all__))

@@ -1,11 +1,12 @@
 """A wrapper of the Go1 that draws something itself."""
 
-from typing import Any, ClassVar, cast
+from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 import gymnasium
 import numpy as np
 
-from go1_mtl_gym.env import Go1Env
+if TYPE_CHECKING:
+    from go1_mtl_gym.env import Go1Env
 
 
 class SeededWrapper(gymnasium.Wrapper):
@@ -24,8 +25,8 @@ class SeededWrapper(gymnasium.Wrapper):
         self._rng = np.random.default_rng()
 
     @property
-    def _go1(self) -> Go1Env:
-        return cast(Go1Env, self.env.unwrapped)
+    def _go1(self) -> "Go1Env":
+        return cast("Go1Env", self.env.unwrapped)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

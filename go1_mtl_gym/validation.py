@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
+from difflib import get_close_matches
 from numbers import Real
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
@@ -125,8 +126,20 @@ def one_of(value: object, allowed: Sequence[str], label: str) -> str:
         InvalidInputError: otherwise.
     """
     if not isinstance(value, str) or value not in allowed:
-        raise InvalidInputError(f"{label} must be one of {', '.join(map(repr, allowed))}; got {value!r}")
+        known = ", ".join(map(repr, allowed))
+        raise InvalidInputError(f"{label} must be one of {known}; got {value!r}{did_you_mean(value, allowed)}")
     return str(value)
+
+
+def did_you_mean(word: object, known: Sequence[str]) -> str:
+    """What a message adds where a word looks like a misspelled one: "; did you mean 'trot'?", or nothing.
+
+    Args:
+        word: what came.
+        known: words that were expected.
+    """
+    closest = get_close_matches(word.lower(), known, n=1) if isinstance(word, str) else []
+    return f"; did you mean {closest[0]!r}?" if closest else ""
 
 
 def yes_or_no(value: object, label: str) -> bool:

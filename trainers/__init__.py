@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from trainers.algorithms.add_task import closest_task, learn_task
-    from trainers.algorithms.bc import BCConfig, BCHistory, BCTrainer, train_bc
-    from trainers.algorithms.dagger import DAggerConfig, DAggerTrainer
+    from trainers.algorithms.bc import BCHistory, BCTrainer, train_bc
+    from trainers.algorithms.config import BCConfig, DAggerConfig, PhaseConfig
+    from trainers.algorithms.dagger import DAggerTrainer
     from trainers.algorithms.dagger_collector import BlockCollector
     from trainers.algorithms.losses import MultiTaskLoss
-    from trainers.algorithms.phase_free import PhaseConfig, train_phase, train_phase_free
+    from trainers.algorithms.phase_free import train_phase, train_phase_free
     from trainers.algorithms.ppo import ppo_from_policy
     from trainers.data.batches import TensorBatches
     from trainers.data.collection import CollectJob, ShardMismatchError, collect, collect_all, watch
@@ -52,7 +53,7 @@ if TYPE_CHECKING:
     from trainers.utils.report import paper_table, results_table
 
 _HOME = {
-    "BCConfig": "algorithms.bc",
+    "BCConfig": "algorithms.config",
     "BCHistory": "algorithms.bc",
     "BCTrainer": "algorithms.bc",
     "BlockCollector": "algorithms.dagger_collector",
@@ -61,7 +62,7 @@ _HOME = {
     "ClosedLoopResult": "evaluation.scoring",
     "CollectJob": "data.collection",
     "Condition": "evaluation.conditions",
-    "DAggerConfig": "algorithms.dagger",
+    "DAggerConfig": "algorithms.config",
     "DAggerTrainer": "algorithms.dagger",
     "Demonstrations": "data.demonstrations",
     "EpisodeRecord": "evaluation.scoring",
@@ -75,7 +76,7 @@ _HOME = {
     "OperatorConfig": "data.operator",
     "OperatorWrapper": "data.operator_wrapper",
     "PerturbationConfig": "data.environments",
-    "PhaseConfig": "algorithms.phase_free",
+    "PhaseConfig": "algorithms.config",
     "PhaseEstimator": "policies.phase_estimator",
     "PhaseFreePolicy": "policies.phase_free",
     "Script": "evaluation.script",

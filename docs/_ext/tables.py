@@ -1,6 +1,5 @@
 """Tables in Markdown that are made from the code when the site is built, so that they cannot go stale."""
 
-import inspect
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import MISSING, fields
@@ -27,6 +26,7 @@ from trainers.evaluation.conditions import CONDITIONS
 from trainers.pipeline.command_line import job_parser
 from trainers.pipeline.config import JobConfig
 from trainers.pipeline.presets import PRESETS
+from trainers.utils.docstrings import described
 
 CONTENT = {
     "accelerometer": "specific force at the IMU, trunk frame",
@@ -288,17 +288,6 @@ def studies() -> str:
             minutes, size = f"{measured.minutes:.0f}" if measured.seconds else "-", f"{path.stat().st_size / 1024:.0f}"
         rows.append((f"`{name}`", summary_line(study_class(name)), minutes, size))
     return markdown(("study", "measures", "one core [min]", "file [kB]"), rows)
-
-
-def described(owner: type) -> dict[str, str]:
-    """What a class's Google docstring says of each name under "Args" or "Attributes", on one line."""
-    text = inspect.cleandoc(owner.__doc__ or "")
-    section = re.search(r"^(?:Args|Attributes):\n((?:(?: .*)?\n?)+)", text, re.MULTILINE)
-    entries: dict[str, str] = {}
-    for names, said in re.findall(r"^ {4}(\w[\w, ]*): (.+(?:\n {8}.+)*)", section[1] if section else "", re.MULTILINE):
-        for name in names.split(", "):
-            entries[name] = " ".join(said.split()).replace("``", "`")
-    return entries
 
 
 TABLES: dict[str, Callable[[], str]] = {

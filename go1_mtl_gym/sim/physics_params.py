@@ -1,14 +1,16 @@
 """Ways in which a real robot differs from the model that its expert has in mind: mass, motors, contacts, delay."""
 
 from dataclasses import astuple, dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import mujoco
 import numpy as np
 
 from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PHYSICS_HZ
 from go1_mtl_gym.validation import Limits, check_numbers
+
+if TYPE_CHECKING:
+    import mujoco
 
 INERTIAL_ARRAYS = ("body_mass", "body_inertia", "dof_armature")
 """Those arrays of a model after whose change `mj_setConst` is due."""
@@ -83,7 +85,7 @@ class PhysicsParams:
         values: list[Any] = [None if value == _NONE else value for value in vector.tolist()]
         return cls(*values)
 
-    def apply(self, model: mujoco.MjModel) -> None:
+    def apply(self, model: "mujoco.MjModel") -> None:
         """Change a model whose PD gains are set already; `mj_setConst` is left to the caller.
 
         A contact takes the friction of the geom of higher priority, and the larger one of two equals: only if all

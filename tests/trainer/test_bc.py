@@ -138,7 +138,7 @@ def test_is_imitations_trainer_and_logs_to_tensorboard(demos, tmp_path):
     trainer.fit(demos)
     lines = (tmp_path / "progress.json").read_text().splitlines()
     assert len(lines) == 6 and trainer.steps_done == 12
-    assert '"bc/mse_walk"' in lines[0] and '"held_out/r2_trot"' in lines[0]
+    assert '"bc/mse/walk"' in lines[0] and '"held_out/r2/trot"' in lines[0]
 
 
 def test_fixed_normalisation_is_kept(demos):

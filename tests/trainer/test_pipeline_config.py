@@ -9,7 +9,7 @@ import pytest
 
 from go1_mtl_gym import DomainRandomization, InvalidInputError
 from trainers import JobConfig
-from trainers.pipeline.command_line import parse_job
+from trainers.cli.train import parse_job
 from trainers.pipeline.demonstrations import held_out_jobs, training_jobs
 
 REFUSED = {
@@ -71,7 +71,7 @@ def test_the_command_line_gives_the_same():
     config, out = parse_job(words.split())
     options = {"tasks": ("walk", "trot"), "seed": 4, "n_envs": 1, "channels": ("command",), "history": 2}
     assert config == JobConfig.from_preset("smoke", **options, control_hz=100)
-    assert out == "x"
+    assert out == Path("x")
     config, out = parse_job(["--preset", "paper"])
     assert (config.rounds, config.channels, config.control_hz, out) == (0, (), 1000, None)
 

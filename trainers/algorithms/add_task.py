@@ -11,7 +11,8 @@ from torch import nn
 
 from go1_mtl_gym.contract import ObservationTerm, PolicyContract
 from go1_mtl_gym.errors import InvalidInputError
-from trainers.algorithms.bc import BCConfig, BCHistory, train_bc, with_images
+from trainers.algorithms.bc import BCHistory, train_bc, with_images
+from trainers.algorithms.config import BCConfig
 from trainers.data.demonstrations import Demonstrations
 from trainers.evaluation.metrics import BATCH, offline_metrics
 from trainers.policies.multi_head import MultiHeadPolicy

@@ -8,73 +8,22 @@ import numpy as np
 import torch
 from imitation.algorithms import bc as imitation_bc
 from imitation.util.logger import HierarchicalLogger
-from tqdm.auto import tqdm
 
-from go1_mtl_gym.errors import Go1Error, InvalidInputError
+from go1_mtl_gym.errors import Go1Error
 from trainers.algorithms import losses
-from trainers.algorithms.optimizer import PRECISIONS, WeightAverage, adamw_one_cycle, matmul_precision
+from trainers.algorithms.config import BCConfig
+from trainers.algorithms.optimizer import WeightAverage, adamw_one_cycle, matmul_precision
 from trainers.data.batches import TensorBatches, check_batch_size
 from trainers.data.demonstrations import Demonstrations
 from trainers.data.mirror import with_mirrored
 from trainers.evaluation.metrics import offline_metrics
 from trainers.policies.multi_head import MultiHeadPolicy
 from trainers.utils.logging import make_logger
+from trainers.utils.progress import Bar
 
 
 class TrainingDivergedError(Go1Error):
     """The loss became NaN or infinite."""
-
-
-@dataclasses.dataclass(frozen=True)
-class BCConfig:
-    """How to clone.
-
-    Attributes:
-        steps: gradient steps.
-        batch_size: rows per step, shared evenly among the tasks.
-        learning_rate: peak of the one-cycle schedule.
-        warmup: fraction of the steps before the peak.
-        weight_decay: of AdamW.
-        max_grad_norm: gradients longer than this are shortened.
-        space: "radians" or "normalized"; see `trainers.algorithms.losses.MultiTaskLoss`.
-        ema_decay: if positive, the result is an exponential moving average of the weights with this decay per step.
-        log_interval: steps between entries of log and history.
-        seed: of the order of the rows.
-        mirror: learn from every row and from its image in a mirror (`trainers.mirrored`), where the gait has one.
-        matmul_precision: of float32 matrix products while training: "highest", "high" or "medium", as
-            `torch.set_float32_matmul_precision` has it. Faster where the processor has something faster to offer.
-        autocast: whether the network computes in bfloat16, which is faster still; the weights stay float32.
-
-    Raises:
-        InvalidInputError: if a figure is outside its range.
-    """
-
-    steps: int = 7000
-    batch_size: int = 1024
-    learning_rate: float = 2e-3
-    warmup: float = 0.1
-    weight_decay: float = 1e-4
-    max_grad_norm: float = 1.0
-    space: str = "radians"
-    ema_decay: float = 0.0
-    log_interval: int = 250
-    seed: int = 0
-    mirror: bool = False
-    matmul_precision: str = "highest"
-    autocast: bool = False
-
-    def __post_init__(self) -> None:
-        for name in ("steps", "batch_size", "log_interval", "learning_rate", "max_grad_norm"):
-            if not getattr(self, name) > 0:
-                raise InvalidInputError(f"{name} must be positive, got {getattr(self, name)!r}")
-        for name in ("warmup", "ema_decay"):
-            if not 0 <= getattr(self, name) < 1:
-                raise InvalidInputError(f"{name} must lie in [0, 1), got {getattr(self, name)!r}")
-        if self.weight_decay < 0:
-            raise InvalidInputError(f"weight_decay must be >= 0, got {self.weight_decay!r}")
-        for name, known in (("space", losses.SPACES), ("matmul_precision", PRECISIONS)):
-            if getattr(self, name) not in known:
-                raise InvalidInputError(f"{name} must be one of {', '.join(known)}; got {getattr(self, name)!r}")
 
 
 @dataclasses.dataclass
@@ -108,6 +57,7 @@ class BCTrainer(imitation_bc.BC):
         policy: the student, its normalisation already fitted.
         config: how to clone.
         logger: shared log, or None for a silent one.
+        first_step: gradient steps that the policy has behind it, where the log's axis goes on.
     """
 
     _policy: MultiHeadPolicy
@@ -115,7 +65,11 @@ class BCTrainer(imitation_bc.BC):
     loss_calculator: losses.MultiTaskLoss  # type: ignore[assignment]  # imitation reads its result's `loss`, no more
 
     def __init__(
-        self, policy: MultiHeadPolicy, config: BCConfig | None = None, logger: HierarchicalLogger | None = None
+        self,
+        policy: MultiHeadPolicy,
+        config: BCConfig | None = None,
+        logger: HierarchicalLogger | None = None,
+        first_step: int = 0,
     ) -> None:
         self.config = config or BCConfig()
         super().__init__(
@@ -127,7 +81,7 @@ class BCTrainer(imitation_bc.BC):
             device=policy.device,
             custom_logger=make_logger() if logger is None else logger,
         )
-        self.steps_done = 0
+        self.steps_done = first_step
         self._bc_logger = _StepLogger(self.logger)
 
     @property
@@ -177,7 +131,7 @@ class BCTrainer(imitation_bc.BC):
         self.history = BCHistory()
         first = self.steps_done
         was_training = policy.training
-        with tqdm(total=config.steps, desc="clone", unit="step", disable=not progress) as bar:
+        with Bar("clone", config.steps, "step", progress) as bar:
 
             def after_step() -> None:
                 schedule.step()
@@ -186,7 +140,7 @@ class BCTrainer(imitation_bc.BC):
                     average.update()
                 bar.update()
                 if (self.steps_done - first) % config.log_interval == 0 or self.steps_done - first == config.steps:
-                    bar.set_postfix(loss=f"{self._record(validation):.2e}")
+                    bar.note(loss=f"{self._record(validation):.2e}")
                 if on_batch_end is not None:
                     on_batch_end()
 
@@ -212,11 +166,11 @@ class BCTrainer(imitation_bc.BC):
             if f"mse_{task}" in last:
                 history.mse.setdefault(task, []).append(last[f"mse_{task}"])
         for name, value in last.items():
-            self.logger.record(f"bc/{name}", value)
+            self.logger.record(f"bc/{name.replace('mse_', 'mse/')}", value)
         if validation is not None:
             for task, scores in offline_metrics(self.policy, validation).items():
                 history.r2.setdefault(task, []).append(scores["r2"])
-                self.logger.record(f"held_out/r2_{task}", scores["r2"])
+                self.logger.record(f"held_out/r2/{task}", scores["r2"])
             self.policy.set_training_mode(True)
         self.logger.dump(self.steps_done)
         return last["loss"]

@@ -11,10 +11,10 @@ import numpy as np
 from imitation.algorithms import dagger as imitation_dagger
 from imitation.util.logger import HierarchicalLogger
 from stable_baselines3.common.vec_env import VecEnv
-from tqdm.auto import tqdm
 
 from go1_mtl_gym.errors import InvalidInputError
-from trainers.algorithms.bc import BCConfig, BCHistory, BCTrainer
+from trainers.algorithms.bc import BCHistory, BCTrainer
+from trainers.algorithms.config import BCConfig, DAggerConfig
 from trainers.algorithms.dagger_collector import BlockCollector
 from trainers.data.collection import ShardMismatchError
 from trainers.data.demonstrations import Demonstrations
@@ -25,50 +25,7 @@ from trainers.policies.expert_policy import ExpertPolicy
 from trainers.policies.multi_head import MultiHeadPolicy
 from trainers.utils.files import json_ready, write_json
 from trainers.utils.logging import make_logger
-
-
-@dataclasses.dataclass(frozen=True)
-class DAggerConfig:
-    """How to collect a round.
-
-    Attributes:
-        seconds_per_task: rows recorded per task and round [s].
-        beta: probability that a block of the first round is the expert's.
-        beta_decay: factor on beta per round.
-        block_s: shortest and longest block [s].
-        takeover_rad: the expert takes over when the root mean square over the joints of the learner's joint targets
-            less its own exceeds this [rad]; None never. See `trainers.BlockCollector`.
-        round_weight: how many times as often a row of a round is drawn in training as a row of the base.
-        seed: of everything random in collection.
-
-    Raises:
-        InvalidInputError: if a figure is outside its range.
-    """
-
-    seconds_per_task: float = 60.0
-    beta: float = 0.5
-    beta_decay: float = 1.0
-    block_s: tuple[float, float] = (0.3, 1.0)
-    takeover_rad: float | None = None
-    round_weight: int = 1
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "block_s", tuple(self.block_s))
-        if not self.seconds_per_task > 0 or self.seed < 0:
-            raise InvalidInputError(f"seconds_per_task must be > 0 and seed >= 0, got {self}")
-        if not (0 <= self.beta <= 1 and 0 <= self.beta_decay <= 1):
-            raise InvalidInputError(f"beta and beta_decay must lie in [0, 1], got {self}")
-        if len(self.block_s) != 2 or not 0 < self.block_s[0] <= self.block_s[1]:
-            raise InvalidInputError(f"block_s must be 0 < shortest <= longest, got {self.block_s}")
-        if self.takeover_rad is not None and not self.takeover_rad > 0:
-            raise InvalidInputError(f"takeover_rad must be None or positive, got {self.takeover_rad}")
-        if isinstance(self.round_weight, bool) or not isinstance(self.round_weight, int) or self.round_weight < 1:
-            raise InvalidInputError(f"round_weight must be an integer of at least 1, got {self.round_weight!r}")
-
-    def beta_of(self, round_num: int) -> float:
-        """Probability of an expert block in a round, counted from 0."""
-        return self.beta * self.beta_decay**round_num
+from trainers.utils.progress import Bar
 
 
 class DAggerTrainer(imitation_dagger.DAggerTrainer):
@@ -88,6 +45,7 @@ class DAggerTrainer(imitation_dagger.DAggerTrainer):
         logger: from `trainers.make_logger`; shared by collection and cloning. None logs nothing.
         validation: held-out rows whose R2 is logged, or None.
         progress: show bars.
+        first_step: gradient steps of the cloning, where the log's axis goes on.
 
     Raises:
         InvalidInputError: if environments, policy and base do not belong together.
@@ -108,6 +66,7 @@ class DAggerTrainer(imitation_dagger.DAggerTrainer):
         logger: HierarchicalLogger | None = None,
         validation: Demonstrations | None = None,
         progress: bool = False,
+        first_step: int = 0,
     ) -> None:
         self.config = config or DAggerConfig()
         for contract in contracts_of(venv):
@@ -123,7 +82,7 @@ class DAggerTrainer(imitation_dagger.DAggerTrainer):
             scratch_dir=scratch_dir,
             rng=np.random.default_rng(self.config.seed),
             beta_schedule=self.config.beta_of,
-            bc_trainer=BCTrainer(policy, bc_config, logger),
+            bc_trainer=BCTrainer(policy, bc_config, logger, first_step),
             custom_logger=logger,
         )
         self.expert_policy = ExpertPolicy(venv)
@@ -203,8 +162,8 @@ class DAggerTrainer(imitation_dagger.DAggerTrainer):
             data = self.rows
             weights = np.full(len(data), self.config.round_weight)
             weights[: len(self.base)] = 1
-            self.logger.record("dagger/round", self.round_num)
-            self.logger.record("dagger/rows", len(data))
+            for name, value in {"round": self.round_num, "rows": len(data)}.items():
+                self.logger.record(f"dagger/{name}", value, exclude="tensorboard")  # lines that only climb
             seed = derive_seed("round", self.bc_trainer.config.seed, self.round_num)
             history = self.bc_trainer.fit(data, self.validation, self.progress, on_batch_end, seed, weights)
             self.policy.save(path)
@@ -252,9 +211,7 @@ class DAggerTrainer(imitation_dagger.DAggerTrainer):
 
     def _drive(self, collector: BlockCollector) -> None:
         obs = collector.reset()
-        with tqdm(
-            total=collector.wanted, desc=f"DAgger {self.round_num}", unit="row", disable=not self.progress
-        ) as bar:
+        with Bar(f"collect round {self.round_num + 1}", collector.wanted, "row", self.progress) as bar:
             while not collector.finished:
                 seen, *_ = collector.step(self.expert_policy.predict(obs)[0])
                 obs = flat_obs(seen)

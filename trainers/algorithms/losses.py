@@ -7,9 +7,8 @@ import numpy as np
 import torch
 
 from go1_mtl_gym.errors import InvalidInputError
+from trainers.algorithms.config import SPACES
 from trainers.policies.multi_head import MultiHeadPolicy
-
-SPACES = ("radians", "normalized")
 
 
 class MultiTaskMetrics:

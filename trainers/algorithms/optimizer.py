@@ -5,9 +5,6 @@ from collections.abc import Iterator, Sequence
 
 import torch
 
-PRECISIONS = ("highest", "high", "medium")
-"""Of float32 matrix products; `torch.set_float32_matmul_precision` says what they mean."""
-
 
 @contextlib.contextmanager
 def matmul_precision(precision: str) -> Iterator[None]:

@@ -1,14 +1,12 @@
 """Teaching a policy to do without a clock: it is watched while it walks, and an estimator learns its phase."""
 
-import dataclasses
 import math
 from typing import Any
 
 import numpy as np
 import torch
-from tqdm.auto import tqdm
 
-from go1_mtl_gym.errors import InvalidInputError
+from trainers.algorithms.config import PhaseConfig
 from trainers.algorithms.optimizer import adamw_one_cycle
 from trainers.data.collection import EPISODE_S, watch
 from trainers.data.demonstrations import Demonstrations
@@ -17,32 +15,7 @@ from trainers.policies import normalization as norm
 from trainers.policies.multi_head import MultiHeadPolicy
 from trainers.policies.phase_estimator import PhaseEstimator, inputs_and_phase
 from trainers.policies.phase_free import CORRECTION, PhaseFreePolicy, phase_free_layout
-
-
-@dataclasses.dataclass(frozen=True)
-class PhaseConfig:
-    """How to train a `PhaseEstimator`.
-
-    Attributes:
-        steps: gradient steps.
-        batch_size: rows per step.
-        learning_rate: peak of the one-cycle schedule.
-        weight_decay: of AdamW.
-        seed: of the order of the rows.
-
-    Raises:
-        InvalidInputError: if a figure is outside its range.
-    """
-
-    steps: int = 4000
-    batch_size: int = 1024
-    learning_rate: float = 2e-3
-    weight_decay: float = 1e-4
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        if not (self.steps > 0 and self.batch_size > 0 and self.learning_rate > 0 and self.weight_decay >= 0):
-            raise InvalidInputError(f"steps, batch_size and learning_rate must be > 0, weight_decay >= 0; got {self}")
+from trainers.utils.progress import tracked
 
 
 def train_phase(
@@ -72,7 +45,7 @@ def train_phase(
     weights = list(estimator.network.parameters())
     optimizer, schedule = adamw_one_cycle(weights, config.learning_rate, config.weight_decay, config.steps)
     rng = np.random.default_rng(config.seed)
-    for _ in tqdm(range(config.steps), "phase", unit="step", disable=not progress):
+    for _ in tracked(range(config.steps), "phase", config.steps, "step", progress):
         batch = torch.from_numpy(rng.integers(len(seen), size=min(config.batch_size, len(seen)))).to(device)
         loss = (estimator(inputs[batch]) - target[batch]).square().sum(dim=1).mean()
         optimizer.zero_grad()
@@ -119,7 +92,7 @@ def train_phase_free(
     perturbation = perturbation or PerturbationConfig()
     watched = [
         watch(student, task, walk_seed, seconds / shards, perturbation, history, make_env=make_env, **env_kwargs)
-        for task, walk_seed in tqdm(walks, "watch", unit="walk", disable=not progress)
+        for task, walk_seed in tracked(walks, "watch", len(walks), "walk", progress)
     ]
     train_phase(estimator, Demonstrations.concatenate(watched), config, progress)
     return policy

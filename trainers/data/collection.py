@@ -12,7 +12,6 @@ import gymnasium
 import joblib
 import numpy as np
 from threadpoolctl import threadpool_limits
-from tqdm.auto import tqdm
 
 from go1_mtl_gym.contract import PolicyContract, terms_of
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
@@ -23,6 +22,7 @@ from trainers.data.environments import EnvFactory, PerturbationConfig, WithTasks
 from trainers.data.stateful import Learner
 from trainers.utils.files import json_form
 from trainers.utils.processes import keep_interrupts
+from trainers.utils.progress import Bar
 from trainers.utils.validation import checked_seed, positive
 
 BEFORE_FALL_S = 0.24
@@ -245,7 +245,7 @@ def collect_all(
     asked = zip(jobs, paths, (contracts[_setting(job)] for job in jobs))
     todo = [(job, path) for job, path, contract in asked if not _is_done(job, path, contract, make_env)]
     done = len(jobs) - len(todo)
-    with tqdm(total=len(jobs), initial=done, desc="collect", unit="shard", disable=not progress) as bar:
+    with Bar("collect", len(jobs), "shard", progress, done) as bar:
         if n_jobs == 1:
             for job, path in todo:
                 _make_shard(job, path, make_env)

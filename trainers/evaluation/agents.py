@@ -7,7 +7,8 @@ from typing import Any
 
 from trainers.evaluation.rollout import checked_agent
 from trainers.policies.loading import load
-from trainers.policies.pretrained import FOLDER, PRETRAINED, load_pretrained
+from trainers.policies.packaged import FOLDER, PRETRAINED
+from trainers.policies.pretrained import load_pretrained
 
 
 def opened(policy_or_expert: Any) -> Any:

@@ -8,7 +8,6 @@ import gymnasium
 import joblib
 import numpy as np
 from threadpoolctl import threadpool_limits
-from tqdm.auto import tqdm
 
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.expert import check_expert_fits
@@ -17,6 +16,7 @@ from trainers.data.environments import EnvFactory, Go1Like, WithTasks, base_env
 from trainers.data.stateful import Learner
 from trainers.evaluation.scoring import Series
 from trainers.utils.processes import keep_interrupts
+from trainers.utils.progress import tracked
 
 
 def checked_agent(policy_or_expert: Any) -> Any:
@@ -187,8 +187,8 @@ def run_all(
         title: of the bar.
     """
     if n_jobs == 1:
-        return [episode(*call) for call in tqdm(calls, title, count, disable=not progress)]
+        return [episode(*call) for call in tracked(calls, title, count, "episode", progress)]
     parallel = joblib.Parallel(n_jobs=n_jobs, return_as="generator")
     with keep_interrupts():
         results = parallel(joblib.delayed(WithTasks(episode))(*call) for call in calls)
-    return list(tqdm(results, title, count, disable=not progress))
+    return list(tracked(results, title, count, "episode", progress))

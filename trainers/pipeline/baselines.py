@@ -4,13 +4,13 @@ from pathlib import Path
 
 import joblib
 import torch
-from tqdm.auto import tqdm
 
 from trainers.algorithms.bc import train_bc
 from trainers.data.demonstrations import Demonstrations
 from trainers.pipeline.config import JobConfig
 from trainers.pipeline.new_policy import new_policy
 from trainers.utils.processes import keep_interrupts
+from trainers.utils.progress import tracked
 
 BASELINES = ("pooled", "paper_literal")
 """No task id; 34 + K numbers without command, phase and last action."""
@@ -36,7 +36,7 @@ def train_baselines(config: JobConfig, names: list[str], folder: Path, progress:
         results = parallel(
             joblib.delayed(_train_baseline)(config, name, folder, progress and n_jobs == 1) for name in names
         )
-    for _ in tqdm(results, "baselines", len(names), unit="network", disable=not progress):
+    for _ in tracked(results, "baselines", len(names), "network", progress):
         pass
 
 

@@ -15,13 +15,11 @@ from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.sensing.observation import CHANNELS
 from go1_mtl_gym.tasks import check_task_names
 from go1_mtl_gym.validation import interval_s, number_in, one_of
-from trainers.algorithms.bc import BCConfig
-from trainers.algorithms.dagger import DAggerConfig
-from trainers.algorithms.phase_free import PhaseConfig
+from trainers.algorithms.config import BCConfig, DAggerConfig, PhaseConfig
 from trainers.data.environments import PerturbationConfig
 from trainers.data.operator import OperatorConfig
 from trainers.pipeline.presets import PRESETS
-from trainers.policies.normalization import MODES
+from trainers.policies.modes import MODES
 from trainers.utils.files import json_ready
 
 NOISE_RAD = 0.06
@@ -55,9 +53,13 @@ class JobConfig:
         channels: optional parts of the observation.
         history: proprioceptive frames in the observation.
         control_hz: rate of the policy [Hz].
-        kp, kd: gains of the actuators [N m/rad, N m s/rad].
-        clean_s, perturbed_s, hard_push_s, randomized_s, held_out_s: demonstrations: undisturbed, perturbed, perturbed
-            and pushed hard, perturbed with physics and sensors that are drawn, and undisturbed for the R2.
+        kp: stiffness of the actuators [N m/rad].
+        kd: their damping [N m s/rad].
+        clean_s: undisturbed demonstrations.
+        perturbed_s: perturbed demonstrations.
+        hard_push_s: perturbed demonstrations that are pushed hard.
+        randomized_s: perturbed demonstrations with physics and sensors that are drawn.
+        held_out_s: undisturbed demonstrations that no policy learns from, for the R2.
         operator: whose hands drive in perturbed demonstrations, rounds and evaluation; None draws commands and gaits.
         margin: how far the operator of demonstrations and rounds reaches, as a multiple of the deflection that the
             policy is evaluated with.
@@ -72,16 +74,19 @@ class JobConfig:
         mirror: whether to learn from the mirror image of every row too.
         shard_s: length of a shard, which begins with a standing start.
         dagger_s: recorded in each DAgger round.
-        takeover_rad, round_weight: of the DAgger rounds, see `trainers.DAggerConfig`.
+        takeover_rad: in rounds the expert takes over when the learner is so far from it [rad]; None never.
+        round_weight: how many times as often a row of a round is drawn in training as a demonstration.
         width: units of each hidden layer.
         normalization: of inputs and outputs, see `trainers.MultiHeadPolicy`.
         batch_size: rows per gradient step.
-        clone_steps, round_steps: gradient steps of cloning and of each round.
+        clone_steps: gradient steps of cloning.
+        round_steps: gradient steps of each round.
         phase_free_s: the policy's walks that the phase-free policy learns the phase from, per gait; 0 makes none.
         phase_free_history: frames of proprioception that it reads.
         phase_free_steps: gradient steps of its phase estimator.
-        episodes, episode_s, command_interval: of the closed-loop evaluation, per task and agent, with drawn commands
-            that change every so many seconds, and as many episodes in the operator's hands.
+        episodes: of the evaluation, per task and agent, with drawn commands, and as many in the operator's hands.
+        episode_s: their length [s].
+        command_interval: time between drawn commands in them [s].
         round_episodes: episodes per task after each DAgger round.
         video_s: length of the videos.
 

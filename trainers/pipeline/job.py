@@ -14,7 +14,7 @@ from trainers.algorithms.dagger import DAggerTrainer
 from trainers.algorithms.phase_free import train_phase_free
 from trainers.data.collection import collect_all
 from trainers.data.demonstrations import Demonstrations
-from trainers.data.environments import make_venv
+from trainers.data.environments import base_env, make_env, make_venv
 from trainers.evaluation.closed_loop import evaluate
 from trainers.evaluation.figures import joint_target_figure
 from trainers.evaluation.metrics import offline_metrics
@@ -24,11 +24,12 @@ from trainers.pipeline.demonstrations import held_out_jobs, training_jobs
 from trainers.pipeline.new_policy import new_policy
 from trainers.pipeline.pictures import save_videos
 from trainers.pipeline.run_folder import RunFolder, read_json
+from trainers.pipeline.stages import Stages, announced_if_slow
 from trainers.policies.checkpoint import versions
 from trainers.policies.loading import load
 from trainers.policies.multi_head import MultiHeadPolicy
 from trainers.utils.files import json_ready, write_json
-from trainers.utils.logging import log_figure, log_round, log_text, make_logger
+from trainers.utils.logging import log_figure, log_round, log_settings, log_text, make_logger
 
 DRAWN, OPERATOR = "drawn", "operator"
 """Where commands come from in the closed loop: the task's range, or hands."""
@@ -66,7 +67,8 @@ class Job:
         self._untrained()  # refuses impossible settings before anything is written
         self.folder = RunFolder(Path(out))
         self.folder.claim(config)
-        self.logger = make_logger(self.folder.tensorboard)
+        self.stages = Stages(config, progress, self.folder.seconds)
+        self.logger = make_logger(self.folder.log)
         log_text(self.logger, "configuration", config.as_dict())
 
     def run(self) -> dict[str, Any]:
@@ -86,8 +88,9 @@ class Job:
     def demonstrations(self) -> tuple[Demonstrations, Demonstrations]:
         """Training rows (clean and perturbed) and held-out rows (clean, other commands and seeds)."""
         train, held_out = training_jobs(self.config), held_out_jobs(self.config)
-        with self.folder.stage("demonstrations"):
+        with self._stage("demonstrations"):
             folder = self.folder.path / "demonstrations"
+            self._prepare_expert(folder)
             paths = collect_all(train + held_out, folder, self.config.n_envs, progress=self.progress)
         shards = [Demonstrations.load(path) for path in paths]
         return Demonstrations.concatenate(shards[: len(train)]), Demonstrations.concatenate(shards[len(train) :])
@@ -98,9 +101,10 @@ class Job:
         """The multi-head policy, cloned from the training rows."""
         path = self.folder.cloned
         if path.is_file():
+            self.stages.skip("clone")
             return MultiHeadPolicy.load(path, self.config.device)
         policy = self._untrained()
-        with self.folder.stage("clone"):
+        with self._stage("clone"):
             train_bc(policy, train, self.config.bc, held_out, self.logger, progress=self.progress)
         policy.save(path)
         return policy
@@ -116,7 +120,7 @@ class Job:
 
     def _rounds(self, policy: MultiHeadPolicy, train: Demonstrations, held_out: Demonstrations) -> Demonstrations:
         """Train a policy in all rounds, in place; returns all rows."""
-        with self._venv() as venv, self.folder.stage("dagger"):
+        with self._stage("dagger"), self._venv() as venv:
             trainer = DAggerTrainer(
                 venv,
                 policy,
@@ -127,6 +131,7 @@ class Job:
                 logger=self.logger,
                 validation=held_out,
                 progress=self.progress,
+                first_step=self.config.clone_steps,
             )
             if trainer.round_num == 0:
                 self._log_round(policy, held_out, 0)
@@ -151,7 +156,7 @@ class Job:
         episodes = self.config.round_episodes
         protocol = DRAWN if self.config.operator is None else OPERATOR
         closed_loop = {task: self.closed_loop(policy, agent, task, episodes, protocol) for task in self.config.tasks}
-        log_round(self.logger, round_num, closed_loop, offline_metrics(policy, held_out))
+        log_round(self.logger, self.config.clone_steps + round_num * self.config.round_steps, closed_loop)
 
     def phase_free(self, policy: MultiHeadPolicy) -> dict[str, Any]:
         """The policy with an estimate of the phase in its clock's place, by name; nothing where it has no clock."""
@@ -159,7 +164,7 @@ class Job:
         if not (config.phase_free_s and config.has_clock):
             return {}
         if not path.is_file():
-            with self.folder.stage("phase_free"):
+            with self._stage("phase_free"):
                 phase_free = train_phase_free(
                     policy,
                     config.phase_free_s,
@@ -171,6 +176,8 @@ class Job:
                     **config.randomization_kwargs(config.randomized),
                 )
             phase_free.save(path)
+        else:
+            self.stages.skip("phase_free")
         return {"phase_free": load(path)}
 
     def baselines(self) -> dict[str, Any]:
@@ -178,8 +185,10 @@ class Job:
         paths = {name: self.folder.parts / f"{name}.zip" for name in baseline_names(self.config)}
         missing = [name for name, path in paths.items() if not path.is_file()]
         if missing:
-            with self.folder.stage("baselines"):
+            with self._stage("baselines"):
                 train_baselines(self.config, missing, self.folder.parts, self.progress)
+        else:
+            self.stages.skip("baselines")
         return {name: load(path) for name, path in paths.items()}
 
     # -- Evaluation ----------------------------------------------------------------------------------------------------
@@ -192,7 +201,7 @@ class Job:
             held_out: rows that none of them learned from.
         """
         tasks = self._one_step_errors(policies, held_out)
-        with self.folder.stage("evaluation"):
+        with self._stage("evaluation"):
             for name, policy in {"expert": "expert", **policies}.items():
                 for task in self.config.tasks:
                     tasks[task].setdefault(name, {}).update(self._scores(policy, name, task))
@@ -205,6 +214,7 @@ class Job:
             "command": self.command,
         }
         write_json(self.folder.metrics, metrics)
+        log_settings(self.logger, self.config.as_dict(), _means(tasks))
         return metrics
 
     def _one_step_errors(
@@ -272,10 +282,41 @@ class Job:
         Raises:
             go1_mtl_gym.rendering.RenderingError: if no video can be drawn on this machine.
         """
-        figure = joint_target_figure(policy, held_out)
-        figure.savefig(self.folder.path / "joint_targets.png", dpi=120)
-        log_figure(self.logger, "joint_targets", figure)
-        save_videos(policy, self.config.tasks, self.config.video_s, self.folder.path, self.progress)
+        with self.stages.stage("pictures"):
+            figure = joint_target_figure(policy, held_out)
+            figure.savefig(self.folder.path / "joint_targets.png", dpi=120)
+            log_figure(self.logger, "joint_targets", figure)
+            save_videos(policy, self.config.tasks, self.config.video_s, self.folder.path, self.progress)
+
+    # -- Details -------------------------------------------------------------------------------------------------------
+
+    @contextlib.contextmanager
+    def _stage(self, name: str) -> Iterator[None]:
+        """Measure a stage, and show where it is."""
+        with self.folder.stage(name), self.stages.stage(name):
+            yield
+
+    def _prepare_expert(self, demonstrations: Path) -> None:
+        """Have the expert's loops compiled once, before every worker begins to do it, if they are not yet."""
+        if demonstrations.is_dir() and any(demonstrations.glob("*.npz")):
+            return
+        sentence = "the expert compiles its loops, once per machine: about half a minute"
+        with announced_if_slow(sentence, self.progress):
+            env = make_env(self.config.tasks[0], **self.config.env_kwargs)
+            env.reset(seed=0)
+            base_env(env).expert_action()
+            env.close()
 
     def _untrained(self) -> MultiHeadPolicy:
         return new_policy(self.config, self.config.env_kwargs)
+
+
+def _means(tasks: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> dict[str, float]:
+    """What runs are compared by: the policy's means over its gaits."""
+    wanted = {"success": "success_rate", "in_hands": "operator_success_rate", "r2": "r2"}
+    scores = [learners["multi_head"] for learners in tasks.values()]
+    return {
+        f"result/{name}": sum(each[key] for each in scores) / len(scores)
+        for name, key in wanted.items()
+        if all(each.get(key) is not None for each in scores)
+    }

@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tqdm.auto import tqdm
 
 from go1_mtl_gym import TASKS
 from trainers.evaluation.video import record_frames, save_gif, tile
+from trainers.utils.progress import tracked
 
 PICTURE = {"width": 280, "height": 210, "fps": 25}
 SPEED = 0.8
@@ -29,7 +29,7 @@ def save_videos(policy: Any, tasks: Sequence[str], seconds: float, folder: Path,
         go1_mtl_gym.rendering.RenderingError: if no picture can be drawn on this machine.
     """
     films: dict[str, np.ndarray] = {}
-    for task in tqdm(tasks, "videos", unit="gait", disable=not progress):
+    for task in tracked(tasks, "videos", len(tasks), "gait", progress):
         command = (SPEED * TASKS[task].command_range[0], 0.0, 0.0)
         films[task] = record_frames(policy, task, seconds, command, **PICTURE)
         save_gif(films[task], folder / f"{task}.gif")

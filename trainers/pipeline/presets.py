@@ -67,3 +67,10 @@ PRESETS: dict[str, dict[str, Any]] = {
     },
 }
 """Name -> what differs from the defaults of `JobConfig`."""
+ABOUT = {
+    "default": "about half an hour on two quiet cores",
+    "smoke": "a few minutes, to see that everything works",
+    "shipped": "for policies like those in the package: one to two hours (an estimate)",
+    "paper": "as arXiv 2505.08574 does: a day (an estimate)",
+}
+"""Name -> what it is for, and how long it takes."""

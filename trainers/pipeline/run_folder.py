@@ -61,8 +61,13 @@ class RunFolder:
 
     @property
     def tensorboard(self) -> Path:
-        """The log."""
+        """The log, to be given to TensorBoard."""
         return self.path / "tensorboard"
+
+    @property
+    def log(self) -> Path:
+        """The log's own folder, by whose name TensorBoard calls the run."""
+        return self.tensorboard / self.path.resolve().name
 
     def closed_loop(self, agent: str, task: str, protocol: str) -> Path:
         """Scores of one agent in one task."""

@@ -7,7 +7,7 @@ from gymnasium import spaces
 
 from go1_mtl_gym.contract import PolicyContract
 from go1_mtl_gym.errors import InvalidInputError
-from trainers.policies import normalization as norm
+from trainers.policies.modes import MODES
 
 
 def number_of_tasks(contract: PolicyContract | None, n_tasks: int | None) -> int:
@@ -65,8 +65,8 @@ def check_arguments(
     ):
         if not isinstance(space, spaces.Box) or len(space.shape) != 1 or space.shape[0] <= smallest:
             raise InvalidInputError(f"{label} must be a flat Box of more than {smallest} entries, got {space}")
-    if normalization not in norm.MODES:
-        raise InvalidInputError(f"normalization must be one of {', '.join(norm.MODES)}; got {normalization!r}")
+    if normalization not in MODES:
+        raise InvalidInputError(f"normalization must be one of {', '.join(MODES)}; got {normalization!r}")
     if not clip_sd > 0:
         raise InvalidInputError(f"clip_sd must be positive, got {clip_sd!r}")
     if sde:

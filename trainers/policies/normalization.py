@@ -5,8 +5,8 @@ import torch
 from torch import nn
 
 from go1_mtl_gym.errors import InvalidInputError
+from trainers.policies.modes import MODES
 
-MODES = ("mean_std", "min_max", "none")
 SMALLEST_SCALE = 1e-3
 """A column that varies less than this is a constant: it is centred but not magnified."""
 

@@ -8,11 +8,8 @@ from go1_mtl_gym.deprecation import warn_renamed
 from go1_mtl_gym.validation import one_of
 from trainers.policies.loading import load
 from trainers.policies.multi_head import MultiHeadPolicy
+from trainers.policies.packaged import FOLDER, PRETRAINED
 from trainers.policies.phase_free import PhaseFreePolicy
-
-PRETRAINED = ("clocked", "phase_free")
-"""The student of the main job's default preset, and the same without a clock."""
-FOLDER = resources.files("trainers") / "assets"
 
 
 def load_pretrained(name: str = "clocked", device: torch.device | str = "cpu") -> MultiHeadPolicy | PhaseFreePolicy:
@@ -28,6 +25,6 @@ def load_pretrained(name: str = "clocked", device: torch.device | str = "cpu") -
     if name == "clockless":
         warn_renamed('load_pretrained("clockless")', '"phase_free"')
         name = "phase_free"
-    one_of(name, PRETRAINED, "name of a policy that comes with the package")
+    one_of(name, tuple(PRETRAINED), "name of a policy that comes with the package")
     with resources.as_file(FOLDER / f"{name}.zip") as path:
         return load(path, device)

@@ -3,10 +3,11 @@
 import json
 from collections.abc import Mapping, Sequence
 from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from imitation.util.logger import HierarchicalLogger, make_output_format
-from stable_baselines3.common.logger import Figure, Logger
+from stable_baselines3.common.logger import Figure, HParam, KVWriter, Logger
 
 from trainers.utils.files import json_ready
 
@@ -15,7 +16,45 @@ if TYPE_CHECKING:
 
 
 NOT_TEXT = ("stdout", "log", "json", "csv")
-ROUND_FIGURES = ("success_rate", "survival_rate", "survival_s", "velocity_error", "yaw_rate_error", "step_rate")
+ROUND_FIGURES = ("success_rate", "survival_rate", "velocity_error", "yaw_rate_error", "step_rate")
+
+
+class TensorBoard(KVWriter):
+    """Writes for TensorBoard, which draws a card per tag and a line per run: the gaits of a figure share its card.
+
+    What is recorded as ``group/figure/task`` becomes the tag ``group/figure`` of the run ``<folder>/<task>``.
+
+    Args:
+        folder: of the run.
+    """
+
+    def __init__(self, folder: str) -> None:
+        self._folder = folder
+        self._writers = {"": make_output_format("tensorboard", folder)}
+
+    def write(self, key_values: dict[str, Any], key_excluded: dict[str, tuple[str, ...]], step: int = 0) -> None:
+        """Write what was recorded since the last time.
+
+        Args:
+            key_values: tag -> value.
+            key_excluded: tag -> formats that it is not for.
+            step: on the log's axis.
+        """
+        runs: dict[str, dict[str, str]] = {}
+        for key in key_values:
+            group, _, task = key.rpartition("/") if key.count("/") == 2 else (key, "", "")
+            runs.setdefault(task, {})[key] = group
+        for task, tags in runs.items():
+            if task not in self._writers:
+                self._writers[task] = make_output_format("tensorboard", str(Path(self._folder) / task))
+            writer = self._writers[task]
+            values = {tag: key_values[key] for key, tag in tags.items()}
+            writer.write(values, {tag: key_excluded.get(key, ()) for key, tag in tags.items()}, step)
+
+    def close(self) -> None:
+        """Close all files."""
+        for writer in self._writers.values():
+            writer.close()
 
 
 def make_logger(
@@ -27,9 +66,13 @@ def make_logger(
         folder: where the files go; None logs nothing.
         formats: any of "tensorboard", "csv", "json", "log", "stdout".
     """
-    outputs = [] if folder is None else [make_output_format(name, str(folder)) for name in formats]
+    outputs = [] if folder is None else [_output(name, str(folder)) for name in formats]
     where = None if folder is None else str(folder)
     return HierarchicalLogger(Logger(where, outputs), () if folder is None else tuple(formats))
+
+
+def _output(name: str, folder: str) -> KVWriter:
+    return TensorBoard(folder) if name == "tensorboard" else make_output_format(name, folder)
 
 
 def log_round(
@@ -42,9 +85,9 @@ def log_round(
 
     Args:
         logger: from `make_logger`.
-        step: the round; 0 after cloning.
-        closed_loop: task -> ``as_dict()`` of what `trainers.evaluate` returned; tags ``closed_loop/<figure>/<task>``. A
-            figure that is None, because every episode fell too early, is left out.
+        step: on the log's axis; gradient steps, in the main job.
+        closed_loop: task -> ``as_dict()`` of what `trainers.evaluate` returned; recorded as
+            ``closed_loop/<figure>/<task>``. A figure that is None, because every episode fell too early, is left out.
         offline: task -> result of `trainers.offline_metrics`; tags ``offline/<figure>/<task>``.
     """
     for task, result in (closed_loop or {}).items():
@@ -68,3 +111,28 @@ def log_figure(logger: HierarchicalLogger, tag: str, figure: "matplotlib.figure.
     """Write a matplotlib figure."""
     logger.record(tag, Figure(figure, close=False), exclude=NOT_TEXT)
     logger.dump(step)
+
+
+def log_settings(logger: HierarchicalLogger, settings: Mapping[str, Any], results: Mapping[str, float]) -> None:
+    """Write what runs are compared by, for TensorBoard's page "HParams".
+
+    Args:
+        logger: from `make_logger`.
+        settings: JSON values; those of nested ones go by "outer.inner".
+        results: tag -> value, which are scalars of the log too.
+    """
+    for tag, value in results.items():
+        logger.record(tag, value)
+    logger.record("hparams", HParam(_flat(settings), dict(results)), exclude=NOT_TEXT)
+    logger.dump(0)
+
+
+def _flat(settings: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Numbers, booleans and text; sequences as text, None left out."""
+    flat: dict[str, Any] = {}
+    for name, value in settings.items():
+        if isinstance(value, Mapping):
+            flat |= _flat(value, f"{prefix}{name}.")
+        elif value is not None:
+            flat[f"{prefix}{name}"] = value if isinstance(value, (bool, int, float, str)) else json.dumps(value)
+    return flat

@@ -1,0 +1,101 @@
+"""``go1-mtl-gym train``: the main job, whose options are the fields of `trainers.JobConfig`."""
+
+import dataclasses
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from trainers.cli.names import ChannelName, GaitName, PresetName
+from trainers.cli.options import PROGRAM, parse, said, unchecked, values_of
+from trainers.data.operator import OperatorConfig
+from trainers.pipeline.config import JobConfig
+from trainers.pipeline.presets import ABOUT
+
+_Hands: Any = unchecked(OperatorConfig)
+_Settings: Any = unchecked(
+    JobConfig,
+    preset=PresetName,
+    tasks=tuple[GaitName, ...],
+    channels=tuple[ChannelName, ...],
+    operator=_Hands | None,
+)
+_FIRST = ("preset", "out")
+"""Options that the help begins with."""
+_SAID = {
+    "preset": "Settings to start from, which the other options change. "
+    + "; ".join(f"{name}: {about}" for name, about in ABOUT.items()),
+    "out": "Folder of the results; an interrupted run goes on in the same one. runs/<date> if not given",
+}
+
+
+def _options() -> type:
+    """The settings, the folder, and the few that everybody changes at the top."""
+    known = {each.name: each for each in dataclasses.fields(_Settings)}
+    out = ("out", said(Path | None, _SAID["out"]), dataclasses.field(default=None))
+    preset = ("preset", said(PresetName, _SAID["preset"]), dataclasses.field(default=PresetName("default")))
+    rest = [(each.name, each.type, _default_of(each)) for each in known.values() if each.name not in _FIRST]
+    return dataclasses.make_dataclass("Options", [preset, out, *rest], namespace={"__doc__": DESCRIPTION})
+
+
+def _default_of(each: "dataclasses.Field[Any]") -> Any:
+    return dataclasses.field(default=each.default, default_factory=each.default_factory)
+
+
+DESCRIPTION = (
+    "Teach one network several gaits of a Go1 from an MPC expert, and measure how well it moves. "
+    "Durations are seconds of robot time per gait; the defaults shown are the preset's."
+)
+Options = _options()
+DRIVE = f"{PROGRAM} evaluate"
+"""The command that the summary suggests for the trained policy."""
+
+
+def run(words: Sequence[str]) -> None:
+    """Run the job."""
+    config, out = parse_job(words)
+    from trainers.pipeline.main_job import run_job
+
+    run_job(config, out, shlex.join([PROGRAM, "train", *words]), drive=DRIVE)
+
+
+def parse_job(words: Sequence[str], command: str = "train") -> tuple[JobConfig, Path | None]:
+    """Read the options of the main job; ``--help`` and unknown options end the program.
+
+    Args:
+        words: after the command.
+        command: as in `trainers.cli.options.parse`.
+
+    Returns:
+        The settings, and the output folder (None: choose one).
+
+    Raises:
+        InvalidInputError: if a setting cannot be.
+    """
+    preset = preset_of(words)
+    settings = JobConfig.from_preset(preset)
+    fields = {each.name: getattr(settings, each.name) for each in dataclasses.fields(settings)}
+    hands = None if settings.operator is None else _Hands(**dataclasses.asdict(settings.operator))
+    fields |= {
+        "operator": hands,
+        "preset": PresetName(preset),
+        "tasks": GaitName.each(settings.tasks),
+        "channels": ChannelName.each(settings.channels),
+    }
+    given = values_of(parse(Options, words, command, Options(**fields)))
+    out = given.pop("out")
+    return JobConfig(**given), out
+
+
+def preset_of(words: Sequence[str]) -> str:
+    """The preset that is asked for, whose values stand for all options that are not given.
+
+    Raises:
+        InvalidInputError: if there is no such preset.
+    """
+    preset = "default"
+    for word, following in zip(words, [*words[1:], ""]):
+        name, equals, value = word.partition("=")
+        if name == "--preset":
+            preset = value if equals else following
+    return PresetName.read(preset)
