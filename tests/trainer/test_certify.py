@@ -11,7 +11,7 @@ from go1_mtl_gym import PAPER_TASKS, TASKS
 from go1_mtl_gym.errors import InvalidInputError
 from tests.trainer.stub_env import HIPS, THIGHS, StubEnv
 from trainers import Certificate, Condition, certify
-from trainers.__main__ import run
+from trainers.cli.program import run
 from trainers.data.environments import ExpertAccess
 from trainers.evaluation.agents import identity
 from trainers.evaluation.conditions import CONDITIONS

@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+from tensorboard.plugins.hparams.plugin_data_pb2 import HParamsPluginData
 
 import trainers
 from go1_mtl_gym.errors import InvalidInputError
 from tests.trainer.stub_env import make_stub
 from trainers import evaluate, joint_target_figure, log_figure, log_round, log_text, make_logger, offline_metrics
+from trainers.utils.logging import log_settings
 
 
 def test_round_text_and_figure_reach_tensorboard(policy, demos, tmp_path):
@@ -17,13 +19,26 @@ def test_round_text_and_figure_reach_tensorboard(policy, demos, tmp_path):
     log_text(logger, "config", {"seed": 1, "nan": float("nan")})
     log_figure(logger, "joint_targets", joint_target_figure(policy, demos), 2)
     logger.close()
-    events = EventAccumulator(str(tmp_path)).Reload()
-    tags = events.Tags()
-    wanted = {"closed_loop/success_rate/trot", "closed_loop/velocity_error/trot", "offline/r2/walk"}
-    assert wanted <= set(tags["scalars"])
-    scalar = events.Scalars("closed_loop/success_rate/trot")[0]
+    gaits = {task: EventAccumulator(str(tmp_path / task)).Reload() for task in ("trot", "walk")}
+    assert {"closed_loop/success_rate", "closed_loop/velocity_error"} <= set(gaits["trot"].Tags()["scalars"])
+    assert "offline/r2" in gaits["walk"].Tags()["scalars"], "the gaits of a figure share its card"
+    scalar = gaits["trot"].Scalars("closed_loop/success_rate")[0]
     assert (scalar.step, scalar.value) == (2, 1.0)
+    tags = EventAccumulator(str(tmp_path)).Reload().Tags()
+    assert not tags["scalars"]
     assert tags["images"] == ["joint_targets"] and "config/text_summary" in tags["tensors"]
+
+
+def test_settings_and_results_are_what_runs_are_compared_by(tmp_path):
+    logger = make_logger(tmp_path)
+    log_settings(logger, {"seed": 1, "operator": {"hold": 2.0}, "tasks": ["trot"], "none": None}, {"result/r2": 0.9}, 7)
+    logger.close()
+    events = EventAccumulator(str(tmp_path)).Reload()
+    assert [(each.step, round(each.value, 6)) for each in events.Scalars("result/r2")] == [(7, 0.9)]
+    begin = events.summary_metadata["_hparams_/session_start_info"].plugin_data.content
+    given = HParamsPluginData.FromString(begin).session_start_info.hparams
+    assert (given["seed"].number_value, given["operator.hold"].number_value) == (1, 2)
+    assert given["tasks"].string_value == '["trot"]' and "none" not in given
 
 
 def test_silent_logger_writes_nothing(capsys):

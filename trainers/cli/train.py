@@ -11,6 +11,7 @@ from trainers.cli.options import PROGRAM, parse, said, unchecked, values_of
 from trainers.data.operator import OperatorConfig
 from trainers.pipeline.config import JobConfig
 from trainers.pipeline.presets import ABOUT
+from trainers.utils.cli import program
 
 _Hands: Any = unchecked(OperatorConfig)
 _Settings: Any = unchecked(
@@ -47,8 +48,6 @@ DESCRIPTION = (
     "Durations are seconds of robot time per gait; the defaults shown are the preset's."
 )
 Options = _options()
-DRIVE = f"{PROGRAM} evaluate"
-"""The command that the summary suggests for the trained policy."""
 
 
 def run(words: Sequence[str]) -> None:
@@ -56,7 +55,7 @@ def run(words: Sequence[str]) -> None:
     config, out = parse_job(words)
     from trainers.pipeline.main_job import run_job
 
-    run_job(config, out, shlex.join([PROGRAM, "train", *words]), drive=DRIVE)
+    run_job(config, out, shlex.join([PROGRAM, "train", *words]), drive=f"{program()} evaluate")
 
 
 def parse_job(words: Sequence[str], command: str = "train") -> tuple[JobConfig, Path | None]:

@@ -156,7 +156,7 @@ class Job:
         episodes = self.config.round_episodes
         protocol = DRAWN if self.config.operator is None else OPERATOR
         closed_loop = {task: self.closed_loop(policy, agent, task, episodes, protocol) for task in self.config.tasks}
-        log_round(self.logger, self.config.clone_steps + round_num * self.config.round_steps, closed_loop)
+        log_round(self.logger, self._steps_after(round_num), closed_loop)
 
     def phase_free(self, policy: MultiHeadPolicy) -> dict[str, Any]:
         """The policy with an estimate of the phase in its clock's place, by name; nothing where it has no clock."""
@@ -214,7 +214,7 @@ class Job:
             "command": self.command,
         }
         write_json(self.folder.metrics, metrics)
-        log_settings(self.logger, self.config.as_dict(), _means(tasks))
+        log_settings(self.logger, self.config.as_dict(), _means(tasks), self._steps_after(self.config.rounds))
         return metrics
 
     def _one_step_errors(
@@ -296,11 +296,15 @@ class Job:
         with self.folder.stage(name), self.stages.stage(name):
             yield
 
+    def _steps_after(self, rounds: int) -> int:
+        """Gradient steps of cloning and so many rounds: the axis of the log."""
+        return self.config.clone_steps + rounds * self.config.round_steps
+
     def _prepare_expert(self, demonstrations: Path) -> None:
         """Have the expert's loops compiled once, before every worker begins to do it, if they are not yet."""
         if demonstrations.is_dir() and any(demonstrations.glob("*.npz")):
             return
-        sentence = "the expert compiles its loops, once per machine: about half a minute"
+        sentence = "the expert gets ready; the first time on a machine it compiles its loops, in about half a minute"
         with announced_if_slow(sentence, self.progress):
             env = make_env(self.config.tasks[0], **self.config.env_kwargs)
             env.reset(seed=0)

@@ -121,7 +121,6 @@ class _StageBar:
     def __exit__(self, kind: object, error: object, trace: object) -> None:
         if kind is None:
             self._show(self._total)
-            self._bar.refresh()
         self._bar.close()
 
     def advance(self, title: str, fraction: float) -> None:

@@ -3,6 +3,7 @@
 import argparse
 import functools
 import shlex
+import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
@@ -122,6 +123,13 @@ def interpreter() -> str:
         return shlex.quote(Path(sys.executable).relative_to(Path.cwd()).as_posix())
     except ValueError:
         return "python"
+
+
+def program() -> str:
+    """What to type for the command line: its own name where the shell finds it, else the interpreter and the module."""
+    found = shutil.which("go1-mtl-gym")
+    beside = found is not None and Path(found).parent == Path(sys.executable).parent
+    return "go1-mtl-gym" if beside else f"{interpreter()} -m trainers"
 
 
 def _sentence(error: Exception) -> str:

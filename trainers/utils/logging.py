@@ -113,18 +113,21 @@ def log_figure(logger: HierarchicalLogger, tag: str, figure: "matplotlib.figure.
     logger.dump(step)
 
 
-def log_settings(logger: HierarchicalLogger, settings: Mapping[str, Any], results: Mapping[str, float]) -> None:
+def log_settings(
+    logger: HierarchicalLogger, settings: Mapping[str, Any], results: Mapping[str, float], step: int = 0
+) -> None:
     """Write what runs are compared by, for TensorBoard's page "HParams".
 
     Args:
         logger: from `make_logger`.
         settings: JSON values; those of nested ones go by "outer.inner".
         results: tag -> value, which are scalars of the log too.
+        step: on the log's axis.
     """
     for tag, value in results.items():
         logger.record(tag, value)
     logger.record("hparams", HParam(_flat(settings), dict(results)), exclude=NOT_TEXT)
-    logger.dump(0)
+    logger.dump(step)
 
 
 def _flat(settings: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
