@@ -12,7 +12,7 @@ PYTHON ?= python3
 ARGS ?=
 PYTEST_ARGS ?= -n 2 --dist worksteal
 
-PIP = bin/python -m pip --disable-pip-version-check install -q
+PIP = bin/python -m pip --disable-pip-version-check install
 TESTED = -c constraints/tested.txt
 SOURCES = pyproject.toml constraints/tested.txt
 

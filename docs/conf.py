@@ -16,6 +16,7 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx_copybutton",
     "docs._ext.code_table",
+    "docs._ext.command_help",
     "docs._ext.docstrings",
     "docs._ext.mathml",
 ]

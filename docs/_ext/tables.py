@@ -21,9 +21,9 @@ from go1_mtl_gym import (
 )
 from go1_mtl_gym.actuation import ActionMap
 from go1_mtl_gym.sensing.observation import CHANNELS, UNITS, ObservationLayout
+from trainers.cli.train import SAID
 from trainers.data.operator import MOVES, OperatorConfig
 from trainers.evaluation.conditions import CONDITIONS
-from trainers.pipeline.command_line import job_parser
 from trainers.pipeline.config import JobConfig
 from trainers.pipeline.presets import PRESETS
 from trainers.utils.docstrings import described
@@ -70,6 +70,8 @@ SETTINGS = {
     "episode_s": "duration of an episode [s]",
 }
 """Settings of the main job that its table shows, and what they are called there."""
+OPTIONS = ("preset", "out", "tasks", "rounds", "seed", "n_envs", "device", "channels", "history", "control_hz")
+"""Of the main job, those that its table shows."""
 NEEDS = {
     "dagger_s": "rounds",
     "round_steps": "rounds",
@@ -222,9 +224,9 @@ def arguments() -> str:
 
 
 def job_options() -> str:
-    """Options of the main job on the command line."""
-    actions = [action for action in job_parser()._actions if action.dest != "help"]
-    rows = [(f"`{action.option_strings[0]}`", (action.help or "").replace("<", r"\<")) for action in actions]
+    """The options of the main job that are given most often."""
+    meaning = described(JobConfig) | SAID
+    rows = [(f"`--{name.replace('_', '-')}`", meaning[name].replace("<", r"\<")) for name in OPTIONS]
     return markdown(("option", "meaning"), rows)
 
 

@@ -4,6 +4,7 @@ import dataclasses
 import inspect
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -189,7 +190,7 @@ def test_evaluate_drives_and_writes_every_episode(tmp_path, capsys):
     out = tmp_path / "scores.json"
     words = ["evaluate", "--tasks", "walk", "--episodes", "1", "--seconds", "3", "--command", "0.3", "0", "-0.1"]
     assert run([*words, "--out", str(out)]) == 0
-    assert capsys.readouterr().out.startswith("walk: 1 of 1 episodes of 3 s succeed")
+    assert re.match(r"walk: [01] of 1 episodes of 3 s succeed .*, 1 survive, ", capsys.readouterr().out)
     scores = json.loads(out.read_text())
     assert scores["tasks"]["walk"]["episodes"][0]["commands"] == [[0.3, 0.0, -0.1]]
     assert scores["policy"]["name"] == "clocked"

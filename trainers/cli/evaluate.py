@@ -35,9 +35,9 @@ class Options:
 
     policy: tyro.conf.Positional[str] = "clocked"
     tasks: Gaits = ()
-    episodes: int = 10
+    episodes: int = 20
     seconds: float = 30.0
-    seed: int = 0
+    seed: int = 1
     command: tuple[float, float, float] | None = None
     command_interval: float | None = None
     corners: bool = False

@@ -81,6 +81,7 @@ def unchecked(kind: type, **types: Any) -> type:
             for each in dataclasses.fields(kind)
         ],
         namespace={"__doc__": first_paragraph(kind)},
+        frozen=True,
     )
 
 

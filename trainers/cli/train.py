@@ -23,24 +23,35 @@ _Settings: Any = unchecked(
 )
 _FIRST = ("preset", "out")
 """Options that the help begins with."""
-_SAID = {
+SAID = {
     "preset": "Settings to start from, which the other options change. "
     + "; ".join(f"{name}: {about}" for name, about in ABOUT.items()),
     "out": "Folder of the results; an interrupted run goes on in the same one. runs/<date> if not given",
 }
 
 
+def _values(settings: JobConfig) -> dict[str, Any]:
+    """Values of the options for some settings: names are names, and the operator is one that checks nothing."""
+    hands = None if settings.operator is None else _Hands(**dataclasses.asdict(settings.operator))
+    fields = {each.name: getattr(settings, each.name) for each in dataclasses.fields(settings)}
+    return fields | {
+        "operator": hands,
+        "preset": PresetName(settings.preset),
+        "tasks": GaitName.each(settings.tasks),
+        "channels": ChannelName.each(settings.channels),
+        "out": None,
+    }
+
+
 def _options() -> type:
-    """The settings, the folder, and the few that everybody changes at the top."""
-    known = {each.name: each for each in dataclasses.fields(_Settings)}
-    out = ("out", said(Path | None, _SAID["out"]), dataclasses.field(default=None))
-    preset = ("preset", said(PresetName, _SAID["preset"]), dataclasses.field(default=PresetName("default")))
-    rest = [(each.name, each.type, _default_of(each)) for each in known.values() if each.name not in _FIRST]
-    return dataclasses.make_dataclass("Options", [preset, out, *rest], namespace={"__doc__": DESCRIPTION})
-
-
-def _default_of(each: "dataclasses.Field[Any]") -> Any:
-    return dataclasses.field(default=each.default, default_factory=each.default_factory)
+    """The settings and the folder; what everybody gives comes first."""
+    types = {each.name: each.type for each in dataclasses.fields(_Settings)} | {
+        "preset": said(PresetName, SAID["preset"]),
+        "out": said(Path | None, SAID["out"]),
+    }
+    names, values = dict.fromkeys((*_FIRST, *types)), _values(JobConfig())
+    fields = [(name, types[name], dataclasses.field(default=values[name])) for name in names]
+    return dataclasses.make_dataclass("Options", fields, namespace={"__doc__": DESCRIPTION}, frozen=True)
 
 
 DESCRIPTION = (
@@ -71,17 +82,8 @@ def parse_job(words: Sequence[str], command: str = "train") -> tuple[JobConfig, 
     Raises:
         InvalidInputError: if a setting cannot be.
     """
-    preset = preset_of(words)
-    settings = JobConfig.from_preset(preset)
-    fields = {each.name: getattr(settings, each.name) for each in dataclasses.fields(settings)}
-    hands = None if settings.operator is None else _Hands(**dataclasses.asdict(settings.operator))
-    fields |= {
-        "operator": hands,
-        "preset": PresetName(preset),
-        "tasks": GaitName.each(settings.tasks),
-        "channels": ChannelName.each(settings.channels),
-    }
-    given = values_of(parse(Options, words, command, Options(**fields)))
+    settings = JobConfig.from_preset(preset_of(words))
+    given = values_of(parse(Options, words, command, Options(**_values(settings))))
     out = given.pop("out")
     return JobConfig(**given), out
 

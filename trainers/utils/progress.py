@@ -86,7 +86,7 @@ class Bar:
 
     def note(self, **figures: object) -> None:
         """Show figures beside the bar."""
-        self._bar.set_postfix(**figures)
+        self._bar.set_postfix(figures)
         if self._above is not None:
             self._above.note(**figures)
 
