@@ -12,10 +12,12 @@ import pytest
 import experts
 import go1_mtl_gym
 import trainers
+from docs._ext.command_help import help_of
 from docs._ext.tables import TABLES, described, markdown
 from experiments.catalog import STUDIES
 from experts import MPCConfig
 from go1_mtl_gym import EnvConfig, PhysicsParams, episode, gaits
+from trainers.cli.program import COMMANDS as CLI_COMMANDS
 from trainers.evaluation import scoring
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -94,6 +96,16 @@ def test_named_studies_exist():
     named = set(re.findall(r"\b(?:experiments run|study) ([a-z]\w+)", lines))
     assert len(named) > 5
     assert named <= set(STUDIES)
+
+
+def test_named_commands_and_their_options_exist():
+    lines = [line.split("#")[0] for line in COMMANDS if re.match(r"(\.venv/bin/)?go1-mtl-gym [a-z]", line)]
+    assert {line.split()[1] for line in lines} >= {"list", "doctor", "train", "evaluate", "certify"}
+    for line in lines:
+        command = line.split()[1]
+        known = help_of(command) if command in CLI_COMMANDS else ""
+        assert known, line
+        assert not [option for option in re.findall(r" (--[a-z.-]+)", line) if option not in known], line
 
 
 def test_make_targets_exist():

@@ -34,7 +34,8 @@ class CommandHelp(SphinxDirective):
 
 def help_of(*command: str) -> str:
     """What ``go1-mtl-gym COMMAND --help`` prints, without colors."""
-    printed, before = io.StringIO(), os.environ.get("COLUMNS")
+    printed = io.TextIOWrapper(io.BytesIO(), encoding="utf-8")  # a terminal that has lines
+    before = os.environ.get("COLUMNS")
     os.environ["COLUMNS"] = COLUMNS
     try:
         with contextlib.redirect_stdout(printed), contextlib.suppress(SystemExit):
@@ -43,7 +44,8 @@ def help_of(*command: str) -> str:
         os.environ.pop("COLUMNS")
         if before is not None:
             os.environ["COLUMNS"] = before
-    return printed.getvalue().strip()
+    printed.seek(0)
+    return printed.read().strip()
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
