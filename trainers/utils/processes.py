@@ -6,8 +6,6 @@ import threading
 from collections.abc import Iterator
 from multiprocessing import resource_tracker
 
-from joblib.externals.loky.backend import resource_tracker as loky_resource_tracker
-
 
 @contextlib.contextmanager
 def keep_interrupts() -> Iterator[None]:
@@ -20,6 +18,8 @@ def keep_interrupts() -> Iterator[None]:
     if not hasattr(signal, "pthread_sigmask") or threading.current_thread() is not threading.main_thread():
         yield
         return
+    from joblib.externals.loky.backend import resource_tracker as loky_resource_tracker  # help does not wait for it
+
     for tracker in (resource_tracker, loky_resource_tracker):
         tracker.ensure_running()  # starting it unblocks SIGINT on Python up to 3.11, so it must be there before
     came: list[int] = []  # the mask is this thread's alone; another one may still receive the signal
