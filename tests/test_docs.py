@@ -100,7 +100,7 @@ def test_named_studies_exist():
 
 def test_named_commands_and_their_options_exist():
     lines = [line.split("#")[0] for line in COMMANDS if re.match(r"(\.venv/bin/)?go1-mtl-gym [a-z]", line)]
-    assert {line.split()[1] for line in lines} >= {"list", "doctor", "train", "evaluate", "certify"}
+    assert {line.split()[1] for line in lines} >= {"list", "doctor", "play", "train", "evaluate", "certify"}
     for line in lines:
         command = line.split()[1]
         known = help_of(command) if command in CLI_COMMANDS else ""

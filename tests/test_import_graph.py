@@ -93,6 +93,30 @@ def test_there_is_no_circle(package):
     assert [circle for circle in circles(edges) if any(name.partition(".")[0] == package for name in circle)] == []
 
 
+LAYERS = ("utils", "data", "policies", "evaluation", "algorithms", "pipeline", "cli")
+"""Sub-packages of `trainers`: each may import those before it."""
+
+
+def layers(module: str) -> set[str]:
+    """Which sub-packages of `trainers` a module may import from: its own and those below."""
+    own = module.split(".")[1]
+    if own == "play":
+        return {*LAYERS[: LAYERS.index("evaluation") + 1], "play"}
+    return {*LAYERS[: LAYERS.index(own) + 1]} | ({"play"} if own == "cli" else set())
+
+
+def test_sub_packages_of_trainers_import_in_their_order():
+    inside = {name: others for name, others in graph(modules()).items() if name.count(".") > 1}
+    inside = {name: others for name, others in inside.items() if name.startswith("trainers.")}
+    assert {name.split(".")[1] for name in inside} == {*LAYERS, "play"}
+    wrong = {
+        name: bad
+        for name, others in inside.items()
+        if (bad := {each for each in others if each.startswith("trainers.") and each.split(".")[1] not in layers(name)})
+    }
+    assert not wrong
+
+
 def test_imports_by_computed_names_are_the_known_ones():
     """They are invisible here, so each one must be looked at by a person once."""
     computed = set()

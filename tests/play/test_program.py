@@ -11,7 +11,7 @@ from PIL import Image
 
 import trainers
 from go1_mtl_gym.errors import InvalidInputError
-from trainers.__main__ import run
+from trainers.cli.program import run
 from trainers.play.record import FilmFile
 
 SCRIPT = {"seconds": 0.4, "moves": [[0.0, "trot"], [0.1, "walk", [0.3, 0.0, 0.0]]]}
@@ -111,7 +111,8 @@ def test_an_episode_of_a_certificate_is_filmed(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--policy", "nothing.zip"], "nothing.zip"),
+        (["--policy", "nothing.zip"], "no policy at nothing.zip"),
+        (["nothing.zip"], "no policy at nothing.zip"),
         (["--task", "hop"], "gait must be one of 'trot'"),
         (["--script", "nothing.json"], "is no script"),
         (["--replay", "nothing.json"], "belong together"),
@@ -122,6 +123,7 @@ def test_an_episode_of_a_certificate_is_filmed(tmp_path, capsys):
         (["--script", "a.json", "--task", "trot"], "--script says everything; beside it came --task"),
         (["--script", "a.json", "--save-script", "b.json"], "beside it came --save-script"),
         (["--seed", "-1"], "seed"),
+        (["--size", "0", "90"], "width of the picture [pixels] must be an integer from 1"),
     ],
 )
 def test_what_cannot_be_done_is_one_sentence(options, message, capsys, tmp_path, monkeypatch):

@@ -13,7 +13,7 @@ import pytest
 
 import trainers
 from go1_mtl_gym import TASKS, InvalidInputError
-from trainers.cli import certify, collect, evaluate, listing, train
+from trainers.cli import certify, collect, evaluate, listing, play, train
 from trainers.cli.options import values_of, with_number
 from trainers.cli.program import COMMANDS, run
 from trainers.evaluation.conditions import CONDITIONS
@@ -57,7 +57,8 @@ def test_help_names_every_command_and_its_options(capsys):
     assert run([]) == run(["--help"]) == 0
     printed = capsys.readouterr().out
     assert all(f"\n  {name} " in printed for name in COMMANDS)
-    for name, kind in {"certify": certify.Options, "evaluate": evaluate.Options, "train": train.Options}.items():
+    for command in (certify, evaluate, play, train):
+        name, kind = command.__name__.rpartition(".")[2], command.Options
         assert ended([name, "--help"]) == 0
         printed = capsys.readouterr().out
         options = [each.name for each in dataclasses.fields(kind) if each.name not in ("policy", "operator", "mirror")]
@@ -81,7 +82,7 @@ def test_it_is_a_module_and_a_script():
     assert 'go1-mtl-gym = "trainers.cli.program:run"' in script
     command = [sys.executable, "-m", "trainers", "nothing"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120)
-    assert done.returncode == 2 and done.stderr.startswith("error: command must be one of 'list', 'train'")
+    assert done.returncode == 2 and done.stderr.startswith("error: command must be one of 'list', 'play'")
 
 
 # -- Misspelled --------------------------------------------------------------------------------------------------------
@@ -100,6 +101,8 @@ def test_it_is_a_module_and_a_script():
         (["certify", "clocked", "--out", "x", "--conditions", "frction"], "did you mean 'friction'?"),
         (["collect", "--out", "x", "--tasks", "wlak"], "did you mean 'walk'?"),
         (["evaluate", "--episods", "3"], "--episodes"),
+        (["play", "--task", "trto"], "did you mean 'trot'?"),
+        (["play", "--polcy", "expert"], "--policy"),
     ],
 )
 def test_a_misspelled_word_is_answered_by_the_one_that_was_meant(words, meant, capsys, tmp_path, monkeypatch):
@@ -113,7 +116,7 @@ def test_a_misspelled_word_is_answered_by_the_one_that_was_meant(words, meant, c
 def test_shells_are_told_commands_options_and_words(shell, capsys):
     assert ended(["--tyro-print-completion", shell]) == 0
     script = capsys.readouterr().out
-    assert all(word in script for word in (*COMMANDS, *TASKS, *PRESETS, *CONDITIONS, "--round-steps", "--tour-seconds"))
+    assert all(word in script for word in (*COMMANDS, *TASKS, *PRESETS, *CONDITIONS, "--round-steps", "--save-script"))
 
 
 # -- Options -----------------------------------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ import tyro
 
 from go1_mtl_gym.validation import integer_in
 from trainers.cli.names import Conditions, Gaits
-from trainers.cli.options import parse, values_of, with_number
+from trainers.cli.options import Unless, parse, values_of, with_number
 from trainers.utils.cli import writable_folder
 
 QUICK: dict[str, Any] = {"episodes": 4, "seconds": 5.0, "tours": 2, "tour_seconds": 10.0}
@@ -48,17 +48,17 @@ class Options:
     conditions: Conditions = ()
     claim: float = 0.99
     allowed_failures: int = 1
-    episodes: int | None = None
-    seconds: float | None = None
-    tours: int | None = None
-    tour_seconds: float | None = None
+    episodes: Unless[int] = None
+    seconds: Unless[float] = None
+    tours: Unless[int] = None
+    tour_seconds: Unless[float] = None
     seed: int = 1
     jobs: int = 1
-    reference: str | None = None
+    reference: Unless[str] = None
     no_early_stop: bool = False
     quick: bool = False
-    video: int | None = None
-    robot: str | None = None
+    video: Unless[int] = None
+    robot: Unless[str] = None
 
 
 def run(words: Sequence[str]) -> None:

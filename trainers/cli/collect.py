@@ -8,7 +8,7 @@ from go1_mtl_gym.actuation import PDGains
 from go1_mtl_gym.env_config import DEFAULT_CHANNELS, DEFAULT_HISTORY
 from go1_mtl_gym.tasks import BUILT_IN_TASKS
 from go1_mtl_gym.validation import integer_in
-from trainers.cli.names import ChannelName, GaitName
+from trainers.cli.names import ChannelName, Command, GaitName
 from trainers.cli.options import parse
 from trainers.data.collection import CollectJob, collect_all
 from trainers.data.environments import PerturbationConfig
@@ -45,7 +45,7 @@ class Options:
     shards: int = 1
     seconds: float = 30.0
     seed: int = 0
-    command: tuple[float, float, float] | None = None
+    command: Command = None
     clean: bool = False
     hands: bool = False
     perturbation: PerturbationConfig = PerturbationConfig()

@@ -7,8 +7,8 @@ from typing import Any
 
 import tyro
 
-from trainers.cli.names import Gaits
-from trainers.cli.options import parse
+from trainers.cli.names import Command, Gaits
+from trainers.cli.options import Unless, parse
 from trainers.data.operator import OperatorConfig
 from trainers.utils.cli import writable_file
 from trainers.utils.files import write_json
@@ -38,13 +38,13 @@ class Options:
     episodes: int = 20
     seconds: float = 30.0
     seed: int = 1
-    command: tuple[float, float, float] | None = None
-    command_interval: float | None = None
+    command: Command = None
+    command_interval: Unless[float] = None
     corners: bool = False
     hands: bool = False
     jobs: int = 1
-    out: Path | None = None
-    robot: str | None = None
+    out: Unless[Path] = None
+    robot: Unless[str] = None
 
 
 def run(words: Sequence[str]) -> None:

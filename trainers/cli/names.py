@@ -62,3 +62,7 @@ class ConditionName(Name):
 Gaits = Annotated[tuple[GaitName, ...], tyro.conf.arg(help_behavior_hint="")]
 Conditions = Annotated[tuple[ConditionName, ...], tyro.conf.arg(help_behavior_hint="")]
 """None of them stands for all, and the help says so."""
+Command = Annotated[
+    tuple[float, float, float] | None, tyro.conf.arg(metavar="FORWARD LEFT TURN", help_behavior_hint="")
+]
+"""Velocities [m/s] and yaw rate [rad/s]; without one they are drawn, and the help says so."""

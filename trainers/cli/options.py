@@ -17,6 +17,17 @@ if TYPE_CHECKING:
 PROGRAM = "go1-mtl-gym"
 """What a user types."""
 Options = TypeVar("Options")
+Kind = TypeVar("Kind")
+
+
+def default_unless_none(default: str) -> str:
+    """What the help adds of a default: nothing where it would be "None", and what that means is said already."""
+    return "" if default == "None" else f"(default: {default})"
+
+
+_HINT = tyro.conf.arg(help_behavior_hint=default_unless_none)
+Unless = Annotated[Kind | None, _HINT]
+"""An option whose help says what happens unless it is given."""
 
 
 def parse(kind: type[Options], words: Sequence[str], command: str, default: Options | None = None) -> Options:
@@ -74,12 +85,14 @@ def unchecked(kind: type, **types: Any) -> type:
         types: of fields that are not read as they are annotated.
     """
     says, hints = described(kind), get_type_hints(kind)
+
+    def type_of(each: "dataclasses.Field[Any]") -> Any:
+        text, type_ = says.get(each.name, ""), types.get(each.name, hints[each.name])
+        return said(type_ if each.default is not None or "None" in text else Annotated[type_, _HINT], text)
+
     return dataclasses.make_dataclass(
         f"{kind.__name__}Options",
-        [
-            (each.name, said(types.get(each.name, hints[each.name]), says.get(each.name, "")), _default(each))
-            for each in dataclasses.fields(kind)
-        ],
+        [(each.name, type_of(each), _default(each)) for each in dataclasses.fields(kind)],
         namespace={"__doc__": first_paragraph(kind)},
         frozen=True,
     )
@@ -136,17 +149,25 @@ def _registry(closed: bool = False) -> "ConstructorRegistry":
     """
     registry = tyro.constructors.ConstructorRegistry()
 
+    def one(kind: Any) -> dict[str, Any]:
+        """What the help shows for a value, and the only words for it if they are to be named."""
+        if issubclass(kind, Name):
+            return {"metavar": f"{{{','.join(kind.known)}}}", "choices": kind.known if closed else None}
+        return {"metavar": kind.__name__.upper()}
+
     @registry.primitive_rule
     def optional(info: "tyro.constructors.PrimitiveTypeInfo") -> "tyro.constructors.PrimitiveConstructorSpec | None":
         kinds = [kind for kind in get_args(info.type) if kind is not type(None)]
-        if len(kinds) == len(get_args(info.type)) or len(kinds) != 1 or kinds[0] not in (int, float, str, Path):
+        if len(kinds) == len(get_args(info.type)) or len(kinds) != 1 or not isinstance(kinds[0], type):
+            return None
+        if not issubclass(kinds[0], (int, float, str, Path)):
             return None
         return tyro.constructors.PrimitiveConstructorSpec(
             nargs=1,
-            metavar=kinds[0].__name__.upper(),
             instance_from_str=lambda words: None if words[0] == "None" else kinds[0](words[0]),
             is_instance=lambda value: value is None or isinstance(value, kinds[0]),
             str_from_instance=lambda value: [str(value)],
+            **one(kinds[0]),
         )
 
     @registry.primitive_rule
@@ -156,11 +177,10 @@ def _registry(closed: bool = False) -> "ConstructorRegistry":
             return None
         return tyro.constructors.PrimitiveConstructorSpec(
             nargs=1,
-            metavar=f"{{{','.join(kind.known)}}}",
             instance_from_str=lambda words: kind(words[0]),
             is_instance=lambda value: isinstance(value, str),
             str_from_instance=lambda value: [str(value)],
-            choices=kind.known if closed else None,
+            **one(kind),
         )
 
     return registry

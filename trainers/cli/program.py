@@ -10,6 +10,7 @@ from typing import Any
 
 COMMANDS = {
     "list": ("listing", "gaits, environments, packaged policies, presets, conditions"),
+    "play": ("play", "drive the policy, or the expert, in a window; film it"),
     "train": ("train", "the main job: demonstrations, cloning, DAgger, evaluation, pictures"),
     "evaluate": ("evaluate", "drive a policy or the expert, and score it"),
     "certify": ("certify", "find out what a policy can be trusted with, as a JSON file and a page"),

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from trainers.cli.names import ChannelName, GaitName, PresetName
-from trainers.cli.options import PROGRAM, parse, said, unchecked, values_of
+from trainers.cli.options import PROGRAM, Unless, parse, said, unchecked, values_of
 from trainers.data.operator import OperatorConfig
 from trainers.pipeline.config import JobConfig
 from trainers.pipeline.presets import ABOUT
@@ -21,6 +21,7 @@ _Settings: Any = unchecked(
     channels=tuple[ChannelName, ...],
     operator=_Hands | None,
 )
+_Folder = Unless[Path]
 _FIRST = ("preset", "out")
 """Options that the help begins with."""
 SAID = {
@@ -47,7 +48,7 @@ def _options() -> type:
     """The settings and the folder; what everybody gives comes first."""
     types = {each.name: each.type for each in dataclasses.fields(_Settings)} | {
         "preset": said(PresetName, SAID["preset"]),
-        "out": said(Path | None, SAID["out"]),
+        "out": said(_Folder, SAID["out"]),
     }
     names, values = dict.fromkeys((*_FIRST, *types)), _values(JobConfig())
     fields = [(name, types[name], dataclasses.field(default=values[name])) for name in names]
@@ -66,7 +67,7 @@ def run(words: Sequence[str]) -> None:
     config, out = parse_job(words)
     from trainers.pipeline.main_job import run_job
 
-    run_job(config, out, shlex.join([PROGRAM, "train", *words]), drive=f"{program()} evaluate")
+    run_job(config, out, shlex.join([PROGRAM, "train", *words]), drive=f"{program()} play --policy")
 
 
 def parse_job(words: Sequence[str], command: str = "train") -> tuple[JobConfig, Path | None]:

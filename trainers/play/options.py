@@ -1,0 +1,66 @@
+"""What one can ask of `play`; to be read without anything heavy."""
+
+import dataclasses
+from pathlib import Path
+
+from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.validation import integer_in
+from trainers.utils.validation import checked_seed
+
+MAX_PIXELS = 16384
+"""Of a side of the picture."""
+
+
+@dataclasses.dataclass(frozen=True)
+class PlayOptions:
+    """Drive a policy or the expert in a window, with held keys or a gamepad, or let a script drive; film it.
+
+    Attributes:
+        policy: File of a policy, "clocked" or "phase_free" (in the package), or "expert" (clocked if not given). As
+            the first word it needs no --policy.
+        task: Gait to begin with (the first one that the policy knows if not given).
+        seed: Of the stand that it begins with (1 if not given).
+        script: JSON file of a trainers.Script, which drives instead of you.
+        save_script: Write down what you do, since the last reset, as such a file.
+        replay: File or folder of a certificate, one of whose episodes drives instead of you.
+        episode: Which one, such as "operator/trot/17".
+        record: Film it: .mp4, .gif, .webp, or .png for the last picture; scripts and replays without a window.
+        ghost: Show the pose that the expert asks for.
+        size: Of window or film [pixels] (1280 720 if not given; of GIF and WebP without a window 640 360).
+        fps: Pictures per second of the film.
+
+    Raises:
+        InvalidInputError: if two of them contradict each other, or one is not as described.
+    """
+
+    policy: str | None = None
+    task: str | None = None
+    seed: int | None = None
+    script: Path | None = None
+    save_script: Path | None = None
+    replay: Path | None = None
+    episode: str | None = None
+    record: Path | None = None
+    ghost: bool = False
+    size: tuple[int, int] | None = None
+    fps: int = 25
+
+    def __post_init__(self) -> None:
+        self._check_together()
+        if self.seed is not None:
+            checked_seed(self.seed)
+        for length, side in zip(self.size or (), ("width", "height")):
+            integer_in(length, 1, MAX_PIXELS, f"{side} of the picture [pixels]")
+
+    def _check_together(self) -> None:
+        """Refuse options that contradict each other."""
+        if self.script is not None and self.replay is not None:
+            raise InvalidInputError("one thing can drive: give --script or --replay, got both")
+        if (self.replay is None) != (self.episode is None):
+            raise InvalidInputError(
+                '--replay FILE and --episode NAME belong together, such as --episode "operator/trot/17"'
+            )
+        driven = "--script" if self.script is not None else "--replay" if self.replay is not None else ""
+        for name in ("task", "save_script", *(("seed",) if self.replay is not None else ())):
+            if driven and getattr(self, name) is not None:
+                raise InvalidInputError(f"{driven} says everything; beside it came --{name.replace('_', '-')}")
