@@ -142,3 +142,15 @@ def test_without_a_display_the_sentence_says_what_to_do(display, message):
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300)
     assert done.returncode == 2 and "Traceback" not in done.stderr
     assert message in done.stderr and "--record FILE.webp" in done.stderr
+
+
+def test_a_student_drives_without_what_only_training_needs():
+    heavy = ("scipy.stats", "torch._dynamo", "pinocchio", "osqp")
+    code = (
+        "import sys, trainers.play.program as program\n"
+        "program.opened('clocked')\n"
+        f"print([name for name in {heavy} if name in sys.modules])"
+    )
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0 and done.stdout == "[]\n", done.stderr

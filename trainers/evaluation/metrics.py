@@ -4,7 +4,7 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import stats
+import scipy  # its parts are loaded when they are used: `stats` takes half a second
 
 from go1_mtl_gym.errors import InvalidInputError
 from trainers.data.demonstrations import Demonstrations
@@ -136,7 +136,7 @@ def exact_interval(successes: int, trials: int, confidence: float = 0.95) -> tup
     """
     if not 0 <= successes <= trials or trials < 1:
         raise InvalidInputError(f"expected 0 <= successes <= trials >= 1, got {successes} of {trials}")
-    interval = stats.binomtest(int(successes), int(trials)).proportion_ci(confidence, "exact")
+    interval = scipy.stats.binomtest(int(successes), int(trials)).proportion_ci(confidence, "exact")
     return float(interval.low), float(interval.high)
 
 
@@ -148,7 +148,7 @@ def lower_bound(successes: int, trials: int, confidence: float = 0.95) -> float:
         trials: n, decided beforehand.
         confidence: c, of this one side.
     """
-    test = stats.binomtest(int(successes), int(trials), alternative="greater")
+    test = scipy.stats.binomtest(int(successes), int(trials), alternative="greater")
     return float(test.proportion_ci(confidence, "exact").low)
 
 
@@ -162,4 +162,4 @@ def mcnemar(only_first: int, only_second: int) -> float:
         only_second: only the second.
     """
     differing = only_first + only_second
-    return float(stats.binomtest(only_first, differing).pvalue) if differing else 1.0
+    return float(scipy.stats.binomtest(only_first, differing).pvalue) if differing else 1.0

@@ -5,7 +5,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import integer_in
@@ -80,7 +80,7 @@ class Plan:
     def fixed(cls, claim: float, confidence: float, episodes: int) -> "Plan":
         """One look after a fixed number of episodes, whatever happens: 299 bear 0 failures at 99 %, 473 bear 1."""
         _check_rates(claim, confidence)
-        tail = stats.binom.cdf(np.arange(MANY_FAILURES + 1), episodes, 1.0 - claim)
+        tail = scipy.stats.binom.cdf(np.arange(MANY_FAILURES + 1), episodes, 1.0 - claim)
         allowed = int((tail <= 1.0 - confidence).sum()) - 1
         return cls(claim, confidence, ((episodes, allowed),) if allowed >= 0 else (), episodes, early=False)
 
@@ -162,7 +162,7 @@ def _looks(claim: float, confidence: float, failures: int) -> tuple[tuple[int, i
 
 def _advance(state: np.ndarray, episodes: int, failure: float) -> np.ndarray:
     """Distribution of the number of failures some episodes later; the last entry holds all the larger numbers."""
-    added = stats.binom.pmf(np.arange(len(state)), episodes, failure)
+    added = scipy.stats.binom.pmf(np.arange(len(state)), episodes, failure)
     after = np.convolve(state, added)[: len(state)]
     after[-1] += state.sum() - after.sum()
     return after

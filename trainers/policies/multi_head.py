@@ -1,5 +1,6 @@
 """The student: one network for all gaits, as a stable-baselines3 policy."""
 
+import functools
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -131,12 +132,17 @@ class MultiHeadPolicy(SavedPolicy, ForEnvironment, ActorCriticPolicy):
         self.obs_normalizer = norm.Normalizer(n_inputs)
         self.act_normalizer = norm.Normalizer(n_actions)
         self.log_std = nn.Parameter(torch.full((n_actions,), float(self.log_std_init)))
+        self._first_rate = float(lr_schedule(1))
+
+    @functools.cached_property
+    def optimizer(self) -> torch.optim.Optimizer:  # type: ignore[override]  # made when it is asked for
+        """For on-policy learning; a policy that only drives has none, since PyTorch's take a second to import."""
         groups: list[dict[str, Any]] = [
             {"params": [*self.actor.parameters(), self.log_std]},
             {"params": list(self.critic.parameters()), "lr_factor": self.critic_lr_factor},
         ]
-        self.optimizer = self.optimizer_class(  # type: ignore[call-arg]  # torch's base class alone knows no rate
-            groups, lr=lr_schedule(1), **self.optimizer_kwargs
+        return self.optimizer_class(  # type: ignore[call-arg]  # torch's base class alone knows no rate
+            groups, lr=self._first_rate, **self.optimizer_kwargs
         )
 
     def network_kwargs(self) -> dict[str, Any]:
