@@ -12,7 +12,7 @@ import pytest
 import experts
 import go1_mtl_gym
 import trainers
-from docs._ext.command_help import help_of
+from docs._ext.help_text import help_of
 from docs._ext.tables import TABLES, described, markdown
 from experiments.catalog import STUDIES
 from experts import MPCConfig
