@@ -36,7 +36,7 @@ def choose_backend() -> None:
     needs a display. So the module that reads it is loaded again here, before the first picture. A choice that the user
     has made stays, and child processes inherit ours.
     """
-    if not sys.platform.startswith("linux") or "MUJOCO_GL" in os.environ or has_display():
+    if "MUJOCO_GL" in os.environ or has_display():
         return
     only_osmesa = ctypes.util.find_library("OSMesa") and not ctypes.util.find_library("EGL")
     os.environ["MUJOCO_GL"] = "osmesa" if only_osmesa else "egl"
@@ -48,8 +48,9 @@ def choose_backend() -> None:
 
 
 def has_display() -> bool:
-    """Whether a window system is there, as X11 and Wayland announce it."""
-    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+    """Whether there is a window system: announced as X11 and Wayland do on Linux, and always on other systems."""
+    announced = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    return bool(announced) or not sys.platform.startswith("linux")
 
 
 def why_no_pictures() -> str:
@@ -195,7 +196,7 @@ class Viewer:
     def __init__(self, simulation: Simulation, width: int, height: int, fps: float) -> None:
         """Open the window."""
         # without a display GLFW ends the whole process instead of raising
-        if sys.platform.startswith("linux") and not has_display():
+        if not has_display():
             raise RenderingError('cannot open a window: there is no display; use render_mode="rgb_array"')
         import mujoco.viewer
 

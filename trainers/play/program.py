@@ -1,6 +1,5 @@
 """What ``go1-mtl-gym play`` does with its options."""
 
-import dataclasses
 import sys
 from pathlib import Path
 from typing import Any
@@ -42,7 +41,7 @@ def play(options: PlayOptions) -> None:
     film = None if options.record is None else FilmFile(writable_file(options.record), options.fps)
     tape = None if options.save_script is None else writable_file(options.save_script)
     script = None if options.script is None else Script.read(options.script)
-    if film is not None and script is None and options.replay is None and not has_window():
+    if film is not None and script is None and options.replay is None and not has_display():
         print("no display: filming the tour of the package; --script FILE films another one", file=sys.stderr)
         script = DEFAULT_TOUR
     session, hands, title = _session(options, script)
@@ -56,11 +55,6 @@ def play(options: PlayOptions) -> None:
     if tape is not None and hands is not None and session.steps:
         hands.script.write(tape)
         print(f"{tape} has what you did: --script {tape} does it again")
-
-
-def has_window() -> bool:
-    """Whether windows can be opened here; other systems than Linux always have a screen."""
-    return has_display() or not sys.platform.startswith("linux")
 
 
 def _session(options: PlayOptions, script: Script | None) -> tuple[Session, Hands | None, str]:
@@ -91,7 +85,7 @@ def _replayed(file: Path, episode: str, named: str | None) -> tuple[Session, Non
     agent = opened(name)
     arguments = certificate.settings.arguments(agent, cell.condition)
     student = None if isinstance(agent, str) else agent
-    return Session(student, dataclasses.replace(setup), None, **arguments), None, episode
+    return Session(student, setup, None, **arguments), None, episode
 
 
 def _film(player: Player, film: FilmFile, size: tuple[int, int]) -> None:

@@ -1,6 +1,5 @@
 """The window: a robot in a player's hands, in real time."""
 
-import sys
 import time
 import warnings
 from collections.abc import Callable
@@ -250,7 +249,7 @@ def _started_glfw() -> Any:
         RenderingError: if there is no screen to open them on.
     """
     # without a display GLFW's functions end the process on some systems
-    if sys.platform.startswith("linux") and not has_display():
+    if not has_display():
         raise RenderingError(f"cannot open a window: there is no display; {NO_WINDOW}")
     try:
         import glfw
