@@ -12,13 +12,14 @@ from go1_mtl_gym.validation import Limits, check_numbers, finite_vector, number_
 
 STAND_COMMAND = (0.02, 0.02, 0.04)
 """A command with smaller |vx|, |vy| [m/s] and |yaw rate| [rad/s] asks for a stand."""
+PHASE_SLACK = 1e-9
+"""Of the clock [cycles]: fractions of a cycle that are added up end a little below the whole."""
 _ALLOWED = {
     "period": Limits(0.15, 3.0, " [s]"),
     "duty": Limits(0.2, 0.95),
     "swing_height": Limits(0.01, 0.2, " [m]"),
     "stance_width": Limits(0.3, 1.5),
 }
-_SLACK = 1e-9  # of the clock [cycles]; adding up fractions of a cycle ends a little below the whole
 
 
 @dataclass(frozen=True)
@@ -165,7 +166,7 @@ def next_phase(gait: Gait, phase: float, command: np.ndarray, seconds: float) ->
     exactly 0.0.
     """
     turns = phase + seconds / gait.period
-    if asks_to_stand(gait, command) and (phase == 0.0 or turns >= 1.0 - _SLACK):
+    if asks_to_stand(gait, command) and (phase == 0.0 or turns >= 1.0 - PHASE_SLACK):
         return 0.0
     return turns % 1.0
 
