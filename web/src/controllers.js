@@ -10,6 +10,11 @@ export class Clocked {
     this.observer = new Observer(student.policy, constants.proprioception);
   }
 
+  /** Whether there is a network for a task. */
+  isReady(taskName) {
+    return this.student.has(taskName);
+  }
+
   reset() {
     this.observer.reset();
   }
@@ -31,14 +36,28 @@ export class PhaseFree {
   /**
    * @param constants of the page.
    * @param policy the constants of this policy.
+   */
+  constructor(constants, policy) {
+    Object.assign(this, { constants, policy });
+    this.observer = new Observer(policy, constants.proprioception);
+    this.clocked = null;
+  }
+
+  /**
+   * Take its networks, which may come later than the page.
+   *
    * @param student that sees a clock.
    * @param estimator of the phase.
    */
-  constructor(constants, policy, student, estimator) {
-    Object.assign(this, { constants, policy, student, estimator });
-    this.observer = new Observer(policy, constants.proprioception);
-    this.clocked = new Clocked(constants, student);
+  load(student, estimator) {
+    this.estimator = estimator;
+    this.clocked = new Clocked(this.constants, student);
     this.reset();
+  }
+
+  /** Whether there is a network for a task. */
+  isReady(taskName) {
+    return this.clocked !== null && this.clocked.isReady(taskName);
   }
 
   reset() {

@@ -42,11 +42,15 @@ export class Robot {
     this.#look();
   }
 
-  /** Drive with another policy from now on. */
-  setController(controller) {
+  /**
+   * Drive with another policy from now on.
+   *
+   * @param inMidstride whether an episode goes on with it; otherwise a reset follows.
+   */
+  setController(controller, inMidstride = true) {
     controller.reset();
     this.controller = controller;
-    controller.observe(this.parts, this.episode.task.gait);
+    if (inMidstride) controller.observe(this.parts, this.episode.task.gait);
   }
 
   setCommand(command) {

@@ -41,7 +41,9 @@ export function makeController(kind) {
   const policy = constants.policies[kind];
   if (kind === "multi_head") return new Clocked(constants, loadStudent(policy));
   const estimator = new PhaseEstimator(policy.estimator, buffer(policy.estimator.weights.file));
-  return new PhaseFree(constants, policy, loadStudent(policy.student), estimator);
+  const controller = new PhaseFree(constants, policy);
+  controller.load(loadStudent(policy.student), estimator);
+  return controller;
 }
 
 /** A simulation of the robot. */

@@ -1,0 +1,75 @@
+/** Builds the page into build/site: bundles, MuJoCo without its debug sections, what Python wrote, licenses. */
+import { cpSync, existsSync, mkdirSync, readdirSync, readFileSync, rmSync, statSync, writeFileSync } from "node:fs";
+import { createRequire } from "node:module";
+import { dirname, join } from "node:path";
+import { fileURLToPath } from "node:url";
+import { gzipSync } from "node:zlib";
+import { build } from "esbuild";
+
+import { withoutSections } from "./wasm_sections.mjs";
+
+const root = dirname(fileURLToPath(import.meta.url));
+const site = join(root, "build", "site"), data = join(root, "build", "data");
+const resolve = createRequire(import.meta.url).resolve;
+
+if (!existsSync(join(data, "constants.json"))) {
+  console.error("build/data is missing: run `python -m web.export` from the repository's root first, or `make web`");
+  process.exit(1);
+}
+rmSync(site, { recursive: true, force: true });
+mkdirSync(site, { recursive: true });
+await build({
+  entryPoints: ["main", "worker"].map((name) => join(root, "src", `${name}.js`)),
+  outdir: site,
+  bundle: true,
+  format: "esm",
+  minify: true,
+  target: "es2022",
+  legalComments: "none",
+  external: ["module", "node:*", "fs", "path", "url"], // what MuJoCo's loader asks for in node alone
+  logLevel: "warning",
+});
+for (const name of ["index.html", "style.css", "icon.svg"]) cpSync(join(root, name), join(site, name));
+cpSync(data, site, { recursive: true });
+const wasm = readFileSync(resolve("@mujoco/mujoco/mujoco.wasm"));
+writeFileSync(join(site, "mujoco.wasm"), withoutSections(wasm, /^(name|producers|\.debug_.*|sourceMappingURL|external_debug_info)$/));
+writeFileSync(join(site, "constants.json"), JSON.stringify(JSON.parse(readFileSync(join(data, "constants.json"), "utf8"))));
+writeFileSync(join(site, "licenses.txt"), licenses());
+writeFileSync(join(site, ".nojekyll"), "");
+report();
+
+/** The licenses of everything that is shipped. */
+function licenses() {
+  const text = (path) => readFileSync(path, "utf8").trim();
+  const parts = [
+    ["go1-mtl-gym: this page, the policy and the robot's model", text(join(root, "..", "LICENSE"))],
+    ["The robot's model: sources of its figures", text(join(root, "..", "go1_mtl_gym", "assets", "NOTICE.md"))],
+    ["three.js", text(join(dirname(resolve("three")), "..", "LICENSE"))],
+    ["MuJoCo (npm package @mujoco/mujoco, which holds no copy of its license), Copyright DeepMind Technologies Limited", text(join(root, "licenses", "Apache-2.0.txt"))],
+    ["Libraries inside MuJoCo", text(join(root, "licenses", "MUJOCO_PARTS.txt"))],
+  ];
+  return parts.map(([title, body]) => `${title}\n${"=".repeat(title.length)}\n\n${body}\n`).join("\n\n");
+}
+
+/** Sizes, as they are sent with compression. */
+function report() {
+  const constants = JSON.parse(readFileSync(join(site, "constants.json"), "utf8"));
+  const { shared, heads } = constants.policies.multi_head;
+  const later = new Set(Object.values(heads).slice(1).map(({ file }) => file));
+  for (const { estimator, student } of Object.values(constants.policies)) {
+    if (estimator) [estimator.weights.file, student.shared.file, ...Object.values(student.heads).map(({ file }) => file)].forEach((file) => later.add(file));
+  }
+  for (const file of [shared.file, Object.values(heads)[0].file, ]) later.delete(file);
+  const sums = { "before the first motion": [0, 0], "in all": [0, 0] };
+  const files = readdirSync(site, { recursive: true }).filter((name) => statSync(join(site, name)).isFile());
+  for (const name of files.sort()) {
+    const bytes = readFileSync(join(site, name)), packed = gzipSync(bytes, { level: 9 }).length;
+    console.log(`${(bytes.length / 1e6).toFixed(3).padStart(8)} MB ${(packed / 1e6).toFixed(3).padStart(8)} MB gzipped  ${name}`);
+    for (const [when, sum] of Object.entries(sums)) {
+      if (when !== "in all" && (later.has(name) || name === "licenses.txt")) continue;
+      sum[0] += bytes.length;
+      sum[1] += packed;
+    }
+  }
+  for (const [when, [bytes, packed]] of Object.entries(sums)) console.log(`${(bytes / 1e6).toFixed(2)} MB, ${(packed / 1e6).toFixed(2)} MB gzipped, ${when}`);
+}

@@ -1,0 +1,104 @@
+/** A visitor's session: his tour drives the same way from its link, and a fall is got over. */
+import assert from "node:assert/strict";
+import test from "node:test";
+
+import { FALL_PAUSE_S, Session } from "../src/session.js";
+import { decode, encode, isOf } from "../src/tour_code.js";
+import { makeController, makeRobot } from "./load.mjs";
+
+const robot = await makeRobot();
+const session = new Session(robot, { multi_head: robot.controller, phase_free: makeController("phase_free") });
+const WEIGHTS = "7fb5e491797eed2d.bin";
+
+/** Let some seconds pass. */
+function wait(seconds) {
+  for (let i = 0; i < Math.round(50 * seconds); i++) assert.ok(session.tick());
+}
+
+/** A tour with everything in it; returns where it ends. */
+function tour() {
+  session.begin({ seed: 7, task: 0 });
+  session.move("stick", [60, 0, 0]);
+  wait(1.5);
+  session.move("button", [4]);
+  session.move("stick", [60, -20, 30]);
+  wait(2);
+  session.move("pull", [50, 0, 30, 900, 700, 400]);
+  wait(0.2);
+  session.move("release", []);
+  session.move("policy", [1]);
+  wait(2);
+  session.move("stick", [0, 0, 0]);
+  wait(1);
+  return robot.simulation.state;
+}
+
+test("a link drives the same tour to the bit", () => {
+  const end = tour();
+  const text = encode({ ...session.tour, weights: WEIGHTS });
+  assert.ok(text.length < 120, `${text.length} letters`);
+  const read = decode(text);
+  assert.deepEqual(read.events, session.tour.events);
+  assert.ok(isOf(read, WEIGHTS) && !isOf(read, "ffff" + WEIGHTS.slice(4)));
+  session.begin(read);
+  for (let i = 0; session.replaying; i++) assert.ok(session.tick() && i < 1000);
+  session.begin(read);
+  wait(6.7);
+  assert.equal(robot.simulation.fallen, false);
+  assert.deepEqual(robot.simulation.state, end);
+  assert.equal(encode({ ...session.tour, weights: WEIGHTS }), text, "and can be handed on");
+});
+
+test("hands that take over end a replay", () => {
+  tour();
+  session.begin(session.tour);
+  wait(1);
+  assert.ok(session.replaying);
+  session.move("stick", [10, 0, 0]);
+  assert.ok(!session.replaying);
+  assert.deepEqual(session.tour.events.at(-2), [50, "stick", [10, 0, 0]]);
+});
+
+test("a robot that is thrown over stands up again", () => {
+  session.begin({ seed: 1, task: 0 });
+  wait(0.5);
+  robot.simulation.push([0, 6, 2]);
+  while (session.fallenFor === 0) wait(0.02);
+  wait(FALL_PAUSE_S + 1);
+  assert.equal(session.falls, 1);
+  assert.equal(robot.simulation.fallen, false);
+  session.move("stick", [50, 0, 0]);
+  wait(3);
+  assert.ok(robot.simulation.baseVelocity[0] > 0.4);
+});
+
+test("a pull moves the robot its way, and is over when it is let go", () => {
+  session.begin({ seed: 1, task: 0 });
+  wait(0.5);
+  session.move("pull", [0, 0, 0, 0, 300, 300]);
+  wait(0.3);
+  assert.ok(robot.simulation.data.qvel[1] > 0.1);
+  session.move("release", []);
+  wait(0.02);
+  assert.ok(robot.simulation.data.xfrc_applied.every((value) => value === 0));
+  wait(2);
+  assert.equal(session.falls, 0);
+});
+
+test("links that hold no tour are refused", () => {
+  assert.throws(() => decode("not a tour!"), /no tour/);
+  assert.throws(() => decode("AgAA"), /cut off|no tour|version/);
+  assert.throws(() => decode(encode({ weights: WEIGHTS, seed: 1, task: 0, events: [[3, "stick", [1, 2, 3]]] }).slice(0, -2)), /cut off/);
+});
+
+test("a gait whose network is on its way holds a tour up", () => {
+  const heads = robot.controller.student?.heads ?? session.controllers.multi_head.student.heads;
+  const { walk } = heads;
+  delete heads.walk;
+  session.begin({ seed: 1, task: 0, events: [[10, "button", [3]], [20, "end", []]] });
+  wait(0.2);
+  assert.equal(session.tick(), false);
+  heads.walk = walk;
+  wait(0.5);
+  assert.equal(robot.episode.requestedTask.gait.name, "walk");
+});
