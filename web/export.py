@@ -27,6 +27,7 @@ from trainers.policies.phase_free import PhaseFreePolicy, without_phase
 from trainers.policies.pretrained import PRETRAINED, load_pretrained
 from trainers.utils.cli import main, writable_folder
 from trainers.utils.files import json_form, write_atomically, write_json
+from web.footfalls import expert_footfalls
 
 OUT = Path(__file__).parent / "build" / "data"
 """Where the page's build looks for it."""
@@ -63,12 +64,13 @@ class WeightFiles:
         return {"file": f"{WEIGHTS}/{name}", "bytes": len(content), "tensors": shapes}
 
 
-def export(policies: Sequence[MultiHeadPolicy | PhaseFreePolicy], out: Path) -> dict[str, Any]:
+def export(policies: Sequence[MultiHeadPolicy | PhaseFreePolicy], out: Path, footfalls: bool = True) -> dict[str, Any]:
     """Write a folder for the page's build; what stood there of an earlier one goes.
 
     Args:
         policies: the student with a clock first; then, if the page is to offer it, one without.
         out: the folder.
+        footfalls: whether the expert's are recorded, which takes a minute.
 
     Returns:
         The constants, as they were written.
@@ -80,6 +82,8 @@ def export(policies: Sequence[MultiHeadPolicy | PhaseFreePolicy], out: Path) -> 
     shutil.rmtree(out, ignore_errors=True)
     files = WeightFiles(out / WEIGHTS)
     values = constants(student.named_contract()) | {"policies": {each.kind: _policy(each, files) for each in policies}}
+    if footfalls:
+        values["footfalls"] = expert_footfalls(student.named_contract())
     for path in MODEL_FILES:
         content = Path(path).read_bytes()
         write_atomically(out / "model" / Path(path).name, lambda file, content=content: file.write(content))  # type: ignore[misc]
@@ -188,9 +192,10 @@ def run(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="python -m web.export", description="Write what the page needs to know.")
     add_policies(parser)
     parser.add_argument("--out", default=OUT, type=Path, help="folder of the data; %(default)s")
+    parser.add_argument("--no-footfalls", action="store_true", help="without the expert's, which take a minute")
     given = parser.parse_args(arguments)
     out = writable_folder(given.out)
-    export(read_policies(given.policy, given.phase_free), out)
+    export(read_policies(given.policy, given.phase_free), out, not given.no_footfalls)
     size = sum(path.stat().st_size for path in out.rglob("*") if path.is_file())
     print(f"{out}: {size / 1e6:.1f} MB")
 

@@ -13,9 +13,12 @@ import gymnasium
 import joblib
 
 from go1_mtl_gym import TASKS
+from go1_mtl_gym.errors import InvalidInputError
 from trainers.data.environments import base_env, make_env
 from trainers.data.operator_wrapper import OperatorWrapper
-from trainers.evaluation.cells import ALL_GAITS, Settings
+from trainers.evaluation.agents import identity
+from trainers.evaluation.cells import ALL_GAITS, FELL, Settings
+from trainers.evaluation.certificate import Certificate
 from trainers.evaluation.conditions import CONDITIONS
 from trainers.evaluation.episodes import EpisodeSetup
 from trainers.evaluation.rollout import controller
@@ -92,48 +95,82 @@ def drive(policy: Policy, script: Script) -> dict[str, Any]:
     }
 
 
-def tour(policy: Policy, setup: EpisodeSetup) -> dict[str, Any]:
+def tour(policy: Policy, setup: EpisodeSetup, outcome: str = "") -> dict[str, Any]:
     """Drive an operator's tour.
 
+    Args:
+        policy: that is driven.
+        setup: of the tour.
+        outcome: a letter from a certificate of the same policy, which has driven it already; empty drives it.
+
     Returns:
-        JSON values: the robot's joints at the start, all that the hands do, the time of the fall or the end [s], and
-        whether it fell.
+        JSON values: the robot's joints at the start, all that the hands do, whether it fell, and, if it was driven,
+        where it ended.
     """
-    seen: dict[str, Any] = {}
+    values: dict[str, Any] = _hands(policy, setup) | {"seconds": setup.seconds, "fallen": outcome == FELL, "qpos": None}
+    if not outcome:
 
-    def watch(env: gymnasium.Env, step: int) -> None:
-        if step == 0 and isinstance(env, OperatorWrapper):
-            seen.update(start=base_env(env).simulation.q, plan=env.plan)
-        seen["qpos"] = base_env(env).simulation.data.qpos.copy()
+        def watch(env: gymnasium.Env, step: int) -> None:
+            values["qpos"] = base_env(env).simulation.data.qpos.copy()
 
-    record, _ = setup.play(policy, policy.env_kwargs, make_env, watch)
-    plan = seen["plan"]
-    segments = [[each.start_s, each.end_s, each.before, each.after] for each in plan.segments]
-    pushes = [[each.time_s, each.angle, each.size, each.hard] for each in plan.pushes]
+        record, _ = setup.play(policy, policy.env_kwargs, make_env, watch)
+        values["fallen"] = record.fallen
+    return values
+
+
+def _hands(policy: Policy, setup: EpisodeSetup) -> dict[str, Any]:
+    """The robot's joints at the start of a tour, and all that the hands do."""
+    env = OperatorWrapper(
+        make_env(setup.task, None, **{**policy.env_kwargs, "episode_s": setup.seconds}), setup.operator
+    )
+    env.reset(seed=setup.seed, options={"task": setup.task})
+    plan = env.plan
+    assert plan is not None  # a reset draws it
     return {
         "task": plan.task,
-        "start": seen["start"],
-        "segments": segments,
+        "start": base_env(env).simulation.q,
+        "segments": [[each.start_s, each.end_s, each.before, each.after] for each in plan.segments],
         "changes": plan.changes,
-        "pushes": pushes,
-        "seconds": setup.seconds,
-        "survival_s": record.survival_s,
-        "fallen": record.fallen,
-        "qpos": seen["qpos"],
+        "pushes": [[each.time_s, each.angle, each.size] for each in plan.pushes],
     }
 
 
-def tours(policy: Policy, count: int, n_jobs: int = 1) -> list[dict[str, Any]]:
-    """The first tours of a certificate.
+def tours(policy: Policy, count: int, outcomes: str = "", n_jobs: int = 1) -> list[dict[str, Any]]:
+    """The first tours of a certificate of `SEED`.
 
     Args:
         policy: that is driven.
         count: how many.
-        n_jobs: processes.
+        outcomes: of the first ones, if they were driven already.
+        n_jobs: processes for the others.
     """
     settings = Settings(0.99, 0.95, 1, None, TOUR_S, count, TOUR_S, SEED, False, policy.tasks, {})
     setups = [settings.setup(CONDITIONS["tour"], ALL_GAITS, number) for number in range(count)]
-    return list(joblib.Parallel(n_jobs=n_jobs)(joblib.delayed(tour)(policy, setup) for setup in setups))
+    known = list(outcomes[:count].ljust(count))
+    calls = (joblib.delayed(tour)(policy, setup, letter.strip()) for setup, letter in zip(setups, known, strict=True))
+    return list(joblib.Parallel(n_jobs=n_jobs)(calls))
+
+
+def outcomes_of(certificate: Certificate, policy: str) -> str:
+    """How the tours of a certificate ended.
+
+    Args:
+        certificate: that holds them.
+        policy: file or name in the package of the policy that the page drives.
+
+    Raises:
+        InvalidInputError: if the certificate is of another policy, or its tours are others.
+    """
+    mine, theirs = identity(policy), certificate.policy
+    if mine["sha256"] != theirs["sha256"]:
+        raise InvalidInputError(f"the certificate is of {theirs}, the page drives {mine}")
+    settings = certificate.settings
+    if (settings.seed, settings.tour_seconds) != (SEED, TOUR_S):
+        raise InvalidInputError(
+            f"tours of {TOUR_S:g} s and seed {SEED} were expected, the certificate has {settings.tour_seconds:g} s "
+            f"and seed {settings.seed}"
+        )
+    return certificate.cell("tour", ALL_GAITS).outcomes
 
 
 @main
@@ -143,14 +180,16 @@ def run(arguments: Sequence[str] | None = None) -> None:
     add_policies(parser)
     parser.add_argument("--out", default=OUT, type=Path, help="folder of the data; %(default)s")
     parser.add_argument("--tours", default=TOURS, type=positive_int, help="how many; %(default)s")
+    parser.add_argument("--certificate", help="file of the policy's certificate, whose tours need not be driven again")
     parser.add_argument("--jobs", default=1, type=int, help="processes for the tours; %(default)s")
     given = parser.parse_args(arguments)
     out = writable_folder(given.out)
+    known = outcomes_of(Certificate.read(given.certificate), given.policy) if given.certificate else ""
     for policy in read_policies(given.policy, given.phase_free):
         driven = {name: drive(policy, script) for name, script in drives(policy.tasks)}
         write_json(out / f"drives_{policy.kind}.json", driven)
         if policy.kind == MultiHeadPolicy.kind:
-            write_json(out / "tours.json", tours(policy, given.tours, given.jobs))
+            write_json(out / "tours.json", tours(policy, given.tours, known, given.jobs))
 
 
 if __name__ == "__main__":
