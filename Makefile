@@ -2,6 +2,8 @@
 # make test         installs into .venv; lint, types and tests       make test PYTEST_ARGS="tests/env -x"
 # make test-newest  the same tests on the newest gymnasium and stable-baselines3, in .venv-newest
 # make docs         builds the documentation into docs/_build         open docs/_build/index.html
+# make web          builds the page for the browser into web/build/site, and tests it; needs Node 20 and npm
+# make web-serve    serves that page                                   open http://localhost:8080/
 # make clean        removes both environments and everything built
 #
 # Another interpreter: make test PYTHON=python3.12 (after make clean).
@@ -21,7 +23,7 @@ test test-newest: export OMP_NUM_THREADS = 1
 test test-newest: export OPENBLAS_NUM_THREADS = 1
 test test-newest: export MKL_NUM_THREADS = 1
 
-.PHONY: dagger test test-newest docs clean
+.PHONY: dagger test test-newest docs web web-serve clean
 
 dagger: .venv/.installed
 	.venv/bin/python examples/dagger.py $(ARGS)
@@ -36,6 +38,19 @@ test-newest: .venv-newest/.installed-test
 
 docs: .venv/.installed-docs
 	.venv/bin/python -m sphinx -E -W --keep-going -q -b html docs docs/_build
+
+# Python writes what the page needs and what it is tested with; everything in web/build is made anew by this.
+web: .venv/.installed web/node_modules/.package-lock.json
+	.venv/bin/python -m web.export $(ARGS)
+	cd web && npm run --silent build
+	.venv/bin/python -m web.reference $(ARGS)
+	cd web && npm run --silent test && npm run --silent smoke
+
+web-serve:
+	cd web && npm run --silent serve
+
+web/node_modules/.package-lock.json: web/package.json web/package-lock.json
+	cd web && npm ci --ignore-scripts --no-audit --no-fund
 
 .venv/.installed: $(SOURCES)
 	$(PYTHON) -m venv .venv
@@ -60,5 +75,5 @@ docs: .venv/.installed-docs
 	touch $@
 
 clean:
-	rm -rf .venv .venv-newest docs/_build build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache
+	rm -rf .venv .venv-newest docs/_build web/build web/node_modules build dist *.egg-info .pytest_cache .ruff_cache .mypy_cache
 	find go1_mtl_gym experts trainers examples experiments tests -name __pycache__ -prune -exec rm -rf {} +
