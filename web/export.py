@@ -105,9 +105,12 @@ def _checked(policies: Sequence[MultiHeadPolicy | PhaseFreePolicy]) -> MultiHead
     for other in policies[1:]:
         if not isinstance(other, PhaseFreePolicy):
             raise InvalidInputError(f"after the student with a clock came {other}, where one without was expected")
-        first.check(other.named_contract(), "the student with a clock", "the one without", ignore=("terms",))
-        if other.contract.channels != without_phase(first.channels):
-            raise InvalidInputError(f"the student without a clock sees {other.contract.channels}")
+        contract = other.named_contract()
+        first.check(contract, "the student with a clock", "the one without", ignore=("terms",))
+        if contract.channels != without_phase(first.channels):
+            raise InvalidInputError(
+                f"the student without a clock must see {without_phase(first.channels)}, it sees {contract.channels}"
+            )
     return policies[0]
 
 

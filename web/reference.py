@@ -7,12 +7,12 @@ certified, with their verdicts.
 import argparse
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import gymnasium
 import joblib
 
-from go1_mtl_gym import TASKS
+from go1_mtl_gym import TASKS, Go1Env
 from go1_mtl_gym.errors import InvalidInputError
 from trainers.data.environments import base_env, make_env
 from trainers.data.operator_wrapper import OperatorWrapper
@@ -59,6 +59,10 @@ _SHARES = (
 """Times [s] of a drive's moves, and the share of the task's range in each direction."""
 
 
+def _go1(env: gymnasium.Env) -> Go1Env:
+    return cast(Go1Env, base_env(env))
+
+
 def drive(policy: Policy, script: Script) -> dict[str, Any]:
     """Let a policy follow a script, and write down everything.
 
@@ -67,7 +71,7 @@ def drive(policy: Policy, script: Script) -> dict[str, Any]:
         action of every step; where it ends, and whether it fell.
     """
     env = make_env(script.moves[0].task, None, **{**policy.env_kwargs, "episode_s": script.seconds})
-    base, act = base_env(env), controller(policy, base_env(env))
+    base, act = _go1(env), controller(policy, base_env(env))
     obs, info = env.reset(seed=SEED, options={"task": script.moves[0].task, "command": script.moves[0].command})
     start, observations, actions, states = base.simulation.q, [], [], []
     push_step = round(PUSH_AT_S * base.control_hz) if len(script.task_names) > 1 else -1
@@ -111,7 +115,7 @@ def tour(policy: Policy, setup: EpisodeSetup, outcome: str = "") -> dict[str, An
     if not outcome:
 
         def watch(env: gymnasium.Env, step: int) -> None:
-            values["qpos"] = base_env(env).simulation.data.qpos.copy()
+            values["qpos"] = _go1(env).simulation.data.qpos.copy()
 
         record, _ = setup.play(policy, policy.env_kwargs, make_env, watch)
         values["fallen"] = record.fallen
@@ -128,7 +132,7 @@ def _hands(policy: Policy, setup: EpisodeSetup) -> dict[str, Any]:
     assert plan is not None  # a reset draws it
     return {
         "task": plan.task,
-        "start": base_env(env).simulation.q,
+        "start": _go1(env).simulation.q,
         "segments": [[each.start_s, each.end_s, each.before, each.after] for each in plan.segments],
         "changes": plan.changes,
         "pushes": [[each.time_s, each.angle, each.size] for each in plan.pushes],

@@ -79,6 +79,7 @@ function expertContacts({ task, phase }) {
 // -- Doing --------------------------------------------------------------------------------------------------------------
 
 function begin(how) {
+  page.sent = [0, 0, 0]; // a stick that is held is sent again
   worker.postMessage({ type: "begin", ...how });
 }
 
