@@ -224,11 +224,14 @@ canvas.addEventListener("pointermove", (event) => {
 });
 for (const kind of ["pointerup", "pointercancel"]) {
   canvas.addEventListener(kind, (event) => {
-    if (page.grabbed?.id !== event.pointerId) return;
-    page.grabbed = null;
-    canvas.classList.remove("pulling");
-    move("release", []);
+    if (page.grabbed?.id === event.pointerId) letGo();
   });
+}
+
+function letGo() {
+  page.grabbed = null;
+  canvas.classList.remove("pulling");
+  move("release", []);
 }
 
 const padButtons = { 4: () => nextGait(-1), 5: () => nextGait(1), 9: () => element("pause").click(), 3: reset };
@@ -275,7 +278,11 @@ function sendStick() {
 
 /** Tell the worker where the robot is dragged to. */
 function sendPull() {
-  if (page.grabbed === null || page.latest.fallen) return;
+  if (page.grabbed === null) return;
+  if (page.latest.fallen) {
+    letGo(); // or it would be torn over again as soon as it stands
+    return;
+  }
   const { point, at } = page.grabbed, millimeters = (vector) => vector.toArray().map((value) => Math.round(1000 * value));
   move("pull", [...millimeters(point), ...millimeters(view.pointAt(...at, point))]);
 }
