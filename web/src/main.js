@@ -42,6 +42,7 @@ const messages = {
     const first = page.demo ? constants.default_tour.moves[0].task : page.tasks[shared.task];
     messages.gait({ name: first });
     if (constants.footfalls === undefined) element("compare").closest("label").remove();
+    if (element("message").classList.contains("error")) return; // a link that could not be read
     if (page.demo) say("Demonstration. Touch a stick, a key or a gait to take over.");
     else say(isOf(shared, weights) ? "A tour from a link: touch anything to take over." : "This tour was driven with another network: it may go elsewhere.");
   },
@@ -173,6 +174,7 @@ window.addEventListener("keyup", (event) => {
   if (event.key === "Shift") stick.slow = false;
   if (isStickKey(event.code)) stick.key(event.code, false, event.shiftKey);
 });
+window.addEventListener("hashchange", () => location.reload()); // another tour was pasted into the address
 window.addEventListener("blur", () => stick.release());
 document.addEventListener("visibilitychange", () => {
   stick.release();
