@@ -23,7 +23,7 @@ test test-newest: export OMP_NUM_THREADS = 1
 test test-newest: export OPENBLAS_NUM_THREADS = 1
 test test-newest: export MKL_NUM_THREADS = 1
 
-.PHONY: dagger test test-newest docs web web-serve clean
+.PHONY: dagger test test-newest docs web web-serve needs-node clean
 
 dagger: .venv/.installed
 	.venv/bin/python examples/dagger.py $(ARGS)
@@ -40,16 +40,22 @@ docs: .venv/.installed-docs
 	.venv/bin/python -m sphinx -E -W --keep-going -q -b html docs docs/_build
 
 # Python writes what the page needs and what it is tested with; everything in web/build is made anew by this.
-web: .venv/.installed web/node_modules/.package-lock.json
+web: needs-node .venv/.installed web/node_modules/.package-lock.json
 	.venv/bin/python -m web.export $(ARGS)
 	cd web && npm run --silent build
 	.venv/bin/python -m web.reference $(ARGS)
 	cd web && npm run --silent test && npm run --silent smoke
 
-web-serve:
+web-serve: needs-node
 	cd web && npm run --silent serve
 
-web/node_modules/.package-lock.json: web/package.json web/package-lock.json
+# Said before anything large is installed.
+needs-node:
+	@command -v node >/dev/null && command -v npm >/dev/null || \
+		{ echo "The page needs Node 20 or newer, with npm (https://nodejs.org); there is none on the PATH." >&2; exit 1; }
+	@node -e 'const { node } = process.versions; if (parseInt(node) < 20) { console.error("The page needs Node 20 or newer, this is " + node + ": https://nodejs.org"); process.exit(1); }'
+
+web/node_modules/.package-lock.json: web/package.json web/package-lock.json | needs-node
 	cd web && npm ci --ignore-scripts --no-audit --no-fund
 
 .venv/.installed: $(SOURCES)
