@@ -19,14 +19,14 @@ if (!existsSync(join(data, "constants.json"))) {
 rmSync(site, { recursive: true, force: true });
 mkdirSync(site, { recursive: true });
 await build({
-  entryPoints: ["main", "worker"].map((name) => join(root, "src", `${name}.js`)),
+  entryPoints: ["main", "page", "worker"].map((name) => join(root, "src", `${name}.js`)),
   outdir: site,
   bundle: true,
   format: "esm",
   minify: true,
   target: "es2022",
   legalComments: "none",
-  external: ["module", "node:*", "fs", "path", "url"], // what MuJoCo's loader asks for in node alone
+  external: ["./page.js", "module", "node:*", "fs", "path", "url"], // the page's second part; what MuJoCo's loader asks for in node alone
   logLevel: "warning",
 });
 for (const name of ["index.html", "style.css", "icon.svg"]) cpSync(join(root, name), join(site, name));
@@ -59,7 +59,7 @@ function report() {
   for (const { estimator, student } of Object.values(constants.policies)) {
     if (estimator) [estimator.weights.file, student.shared.file, ...Object.values(student.heads).map(({ file }) => file)].forEach((file) => later.add(file));
   }
-  for (const file of [shared.file, Object.values(heads)[0].file, ]) later.delete(file);
+  for (const file of [shared.file, Object.values(heads)[0].file]) later.delete(file);
   const sums = { "before the first motion": [0, 0], "in all": [0, 0] };
   const files = readdirSync(site, { recursive: true }).filter((name) => statSync(join(site, name)).isFile());
   for (const name of files.sort()) {

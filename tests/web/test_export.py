@@ -85,6 +85,7 @@ def test_the_constants_are_the_environments(policies, constants):
         assert task["gait"]["change_phase"] == TASKS[name].gait.change_phase
         assert task["gait"]["can_stand"] == TASKS[name].gait.can_stand
         assert task["command_range"] == list(TASKS[name].command_range)
+        assert task["push_limit"] == list(TASKS[name].push_limit)
     low = constants["policies"]["multi_head"]["low"]
     np.testing.assert_array_equal(np.float32(low), env.layout.low)
 

@@ -16,6 +16,12 @@ export function pressButton(robot, taskName) {
   robot.setTask(taskName);
 }
 
+/** The largest push in a direction [m/s], as `Task.largest_push` has it: of an ellipse in each quadrant. */
+export function largestPush({ push_limit: [forward, backward, sideways] }, angle) {
+  const x = Math.cos(angle), y = Math.sin(angle), along = x >= 0 ? forward : backward;
+  return along === 0 || sideways === 0 ? 0 : 1 / Math.hypot(x / along, y / sideways);
+}
+
 /** Push the trunk by a change of velocity [m/s] at an angle from forward to the left [rad]. */
 export function push(robot, size, angle) {
   const direction = angle + robot.simulation.yaw;

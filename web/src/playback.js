@@ -23,6 +23,11 @@ export class Playback {
     if (kept > 1) this.frames.splice(0, kept - 1);
   }
 
+  /** Be as far as the physics: time stands still. */
+  catchUp() {
+    this.timeS = this.frames.at(-1)?.timeS ?? null;
+  }
+
   /**
    * The pose to draw, or null if there is none yet.
    *

@@ -15,6 +15,17 @@ function prepared(canvas) {
   return { context, width, height };
 }
 
+/** Where samples fulfil a condition: pairs [first, one after the last]. */
+function runs(samples, condition) {
+  const pairs = [];
+  samples.forEach((sample, i) => {
+    if (!condition(sample)) return;
+    if (pairs.at(-1)?.[1] === i) pairs.at(-1)[1] = i + 1;
+    else pairs.push([i, i + 1]);
+  });
+  return pairs;
+}
+
 export class Plots {
   /**
    * @param strip canvas of the contacts.
@@ -38,7 +49,7 @@ export class Plots {
 
   draw() {
     this.#drawStrip();
-    this.#drawPlot();
+    if (this.plot.clientWidth > 0) this.#drawPlot(); // small screens have no room for it
   }
 
   #drawStrip() {
@@ -49,13 +60,13 @@ export class Plots {
       const top = row * leg + 2, tall = row - 5;
       context.fillStyle = COLORS.text;
       context.fillText(name, 0, top + tall / 2);
-      for (const [i, { contacts, planned }] of shown.entries()) {
-        const x = left + (columns - shown.length + i) * step;
-        context.fillStyle = COLORS.contact;
-        if (contacts[leg]) context.fillRect(x, top, step + 0.5, tall - 3);
-        context.fillStyle = COLORS.plan;
-        if (planned[leg]) context.fillRect(x, top + tall - 2, step + 0.5, 2.5);
-      }
+      const first = left + (columns - shown.length) * step;
+      const bars = (color, isDown, y, high) => {
+        context.fillStyle = color;
+        for (const [from, to] of runs(shown, isDown)) context.fillRect(first + from * step, y, (to - from) * step, high);
+      };
+      bars(COLORS.contact, ({ contacts }) => contacts[leg], top, tall - 3);
+      bars(COLORS.plan, ({ planned }) => planned[leg], top + tall - 2, 2.5);
     }
   }
 

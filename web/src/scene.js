@@ -1,30 +1,28 @@
 /** The robot and its floor, drawn by three.js. z points up, as in MuJoCo. */
 import {
-  AmbientLight, ArrowHelper, BoxGeometry, CanvasTexture, CapsuleGeometry, Color, CylinderGeometry, DirectionalLight,
-  Fog, Group, HemisphereLight, Mesh, MeshStandardMaterial, PCFShadowMap, PerspectiveCamera, Plane, PlaneGeometry,
-  Quaternion, Raycaster, RepeatWrapping, Scene, SphereGeometry, SRGBColorSpace, Vector2, Vector3, WebGLRenderer,
+  AmbientLight, ArrowHelper, CanvasTexture, Color, DirectionalLight, Fog, Group, HemisphereLight, Mesh,
+  MeshStandardMaterial, PCFShadowMap, Plane, PlaneGeometry, Raycaster, RepeatWrapping, Scene, SRGBColorSpace, Vector2,
+  Vector3, WebGLRenderer,
 } from "three";
-import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import { FollowingCamera } from "./camera.js";
+import { meshOf } from "./robot_meshes.js";
 
 const SKY = new Color(0xdfe7ee);
 const FLOOR_M = 80, TILE_M = 1;
-const FOLLOW_S = 0.12; // time constant of the camera's way after the robot
 
 export class View {
-  /** @param canvas that is drawn on. */
-  constructor(canvas) {
+  /**
+   * @param canvas that is drawn on.
+   * @param calm whether the visitor asked for little motion.
+   */
+  constructor(canvas, calm) {
     this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
     this.scene = new Scene();
     this.scene.background = SKY;
     this.scene.fog = new Fog(SKY, 6, 26);
-    this.camera = new PerspectiveCamera(38, 1, 0.05, 100);
-    this.camera.up.set(0, 0, 1);
-    this.camera.position.set(1.35, -1.6, 0.85);
-    this.controls = new OrbitControls(this.camera, canvas);
-    Object.assign(this.controls, { enableDamping: true, enablePan: false, minDistance: 0.6, maxDistance: 8, maxPolarAngle: 1.52 });
-    this.controls.target.set(0, 0, 0.22);
+    this.camera = new FollowingCamera(canvas, calm);
     this.#light();
     this.#floor();
     this.string = new ArrowHelper(new Vector3(1, 0, 0), new Vector3(), 1, 0xd9480f, 0.08, 0.05);
@@ -54,13 +52,8 @@ export class View {
       group.position.set(x, y, z);
       group.quaternion.set(qx, qy, qz, qw);
     }
-    const { x, y } = this.bodies[this.trunk].position, target = this.controls.target;
-    const share = 1 - Math.exp(-elapsedS / FOLLOW_S);
-    const dx = share * (x - target.x), dy = share * (y - target.y);
-    target.x += dx;
-    target.y += dy;
-    this.camera.position.x += dx;
-    this.camera.position.y += dy;
+    const { position, quaternion } = this.bodies[this.trunk], { x, y } = position;
+    this.camera.follow(position, yawOf(quaternion), elapsedS);
     this.sun.position.set(x + 1.2, y - 1.4, 4);
     this.sun.target.position.set(x, y, 0);
     this.floor.position.set(TILE_M * 2 * Math.round(x / (2 * TILE_M)), TILE_M * 2 * Math.round(y / (2 * TILE_M)), 0);
@@ -70,20 +63,18 @@ export class View {
   resize(width, height, pixelRatio) {
     this.renderer.setPixelRatio(Math.min(pixelRatio, 2));
     this.renderer.setSize(width, height, false);
-    this.camera.aspect = width / height;
-    this.camera.fov = width < height ? 52 : 38;
-    this.camera.updateProjectionMatrix();
+    this.camera.fit(width / height);
   }
 
   draw() {
-    this.controls.update();
-    this.renderer.render(this.scene, this.camera);
+    this.camera.controls.update();
+    this.renderer.render(this.scene, this.camera.lens);
   }
 
   /** The point of the trunk's frame that a pointer at (x, y) in [-1, 1] hits, or null. */
   grab(x, y) {
     if (!this.robot) return null;
-    this.raycaster.setFromCamera(new Vector2(x, y), this.camera);
+    this.raycaster.setFromCamera(new Vector2(x, y), this.camera.lens);
     const hit = this.raycaster.intersectObject(this.robot, true)[0];
     return hit ? this.bodies[this.trunk].worldToLocal(hit.point.clone()) : null;
   }
@@ -91,8 +82,8 @@ export class View {
   /** Where a pointer is in the plane through a point of the trunk that faces the camera, world frame. */
   pointAt(x, y, grabbed) {
     const through = this.bodies[this.trunk].localToWorld(grabbed.clone());
-    const plane = new Plane().setFromNormalAndCoplanarPoint(this.camera.getWorldDirection(new Vector3()), through);
-    this.raycaster.setFromCamera(new Vector2(x, y), this.camera);
+    const plane = new Plane().setFromNormalAndCoplanarPoint(this.camera.lens.getWorldDirection(new Vector3()), through);
+    this.raycaster.setFromCamera(new Vector2(x, y), this.camera.lens);
     return this.raycaster.ray.intersectPlane(plane, new Vector3()) ?? through;
   }
 
@@ -148,32 +139,7 @@ function checker() {
   return canvas;
 }
 
-function meshOf({ shape, size, position, quaternion, color, shininess, emission }) {
-  const mesh = new Mesh(
-    geometryOf(shape, size),
-    new MeshStandardMaterial({
-      color: new Color().setRGB(color[0], color[1], color[2], SRGBColorSpace),
-      roughness: 1 - 0.6 * shininess,
-      metalness: 0.15,
-      emissive: new Color().setRGB(color[0], color[1], color[2], SRGBColorSpace),
-      emissiveIntensity: emission,
-    }),
-  );
-  const [w, x, y, z] = quaternion;
-  mesh.position.set(...position);
-  // three.js has its cylinders along y, MuJoCo along z
-  const turn = shape === "cylinder" || shape === "capsule" ? new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), Math.PI / 2) : new Quaternion();
-  mesh.quaternion.set(x, y, z, w).multiply(turn);
-  if (shape === "ellipsoid") mesh.scale.set(...size);
-  mesh.castShadow = mesh.receiveShadow = true;
-  return mesh;
-}
-
-/** Geometry of a MuJoCo shape, whose sizes are radii and half lengths. */
-function geometryOf(shape, [a, b, c]) {
-  if (shape === "sphere") return new SphereGeometry(a, 20, 14);
-  if (shape === "ellipsoid") return new SphereGeometry(1, 24, 16);
-  if (shape === "capsule") return new CapsuleGeometry(a, 2 * b, 6, 16);
-  if (shape === "cylinder") return new CylinderGeometry(a, a, 2 * b, 28);
-  return new BoxGeometry(2 * a, 2 * b, 2 * c);
+/** Heading [rad] of an attitude. */
+function yawOf({ x, y, z, w }) {
+  return Math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z));
 }

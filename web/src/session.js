@@ -1,5 +1,5 @@
 /** A robot in a visitor's hands: his moves, what is done by itself after a fall, and a tour that can be driven again. */
-import { moveStick, pressButton } from "./operator.js";
+import { largestPush, moveStick, pressButton, push } from "./operator.js";
 
 export const FALL_PAUSE_S = 1.5;
 /** A fallen robot lies for this long before it stands up anew [s]. */
@@ -84,6 +84,7 @@ export class Session {
     if (kind === "button") pressButton(this.robot, this.tasks[values[0]]);
     if (kind === "pull") this.pulled = { point: meters(values.slice(0, 3)), target: meters(values.slice(3)) };
     if (kind === "release") this.pulled = null;
+    if (kind === "push") this.#push(values[0] / 1000, values[1] / 100);
     if (kind === "policy") {
       this.policy = values[0];
       this.robot.setController(this.controllers[this.names[this.policy]]);
@@ -141,6 +142,17 @@ export class Session {
     this.pulled = null;
     this.robot.simulation.release();
     this.robot.reset(taskName, [0, 0, 0], q);
+  }
+
+  /**
+   * Push the trunk.
+   *
+   * @param direction from the world's x axis to the left [rad].
+   * @param share of the largest push that the expert bears in the present gait and that direction.
+   */
+  #push(direction, share) {
+    const { simulation, episode } = this.robot, angle = direction - simulation.yaw;
+    push(this.robot, share * largestPush(episode.task, angle), angle);
   }
 
   /** Pull at the trunk with a damped string of limited strength. */

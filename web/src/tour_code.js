@@ -8,6 +8,7 @@ const KINDS = [
   ["release", 0],
   ["policy", 1], // index of the policy
   ["end", 0], // nothing more is known
+  ["push", 2], // direction from the world's x axis to the left [mrad], percent of the largest
 ];
 const VERSION = 1;
 

@@ -49,7 +49,7 @@ export function makeController(kind) {
 /** A simulation of the robot. */
 export async function makeSimulation() {
   const wasm = createRequire(import.meta.url).resolve("@mujoco/mujoco/mujoco.wasm");
-  const mj = await loadModule(readFileSync(wasm));
+  const mj = await loadModule(await WebAssembly.compile(readFileSync(wasm)));
   const files = Object.fromEntries(
     ["go1.xml", "scene.xml"].map((name) => [name, readFileSync(join(data, "model", name), "utf8")]),
   );

@@ -2,9 +2,10 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 
+import { largestPush } from "../src/operator.js";
 import { FALL_PAUSE_S, Session } from "../src/session.js";
 import { decode, encode, isOf } from "../src/tour_code.js";
-import { makeController, makeRobot } from "./load.mjs";
+import { constants, makeController, makeRobot } from "./load.mjs";
 
 const robot = await makeRobot();
 const session = new Session(robot, { multi_head: robot.controller, phase_free: makeController("phase_free") });
@@ -26,6 +27,7 @@ function tour() {
   session.move("pull", [50, 0, 30, 900, 700, 400]);
   wait(0.2);
   session.move("release", []);
+  session.move("push", [785, 50]);
   session.move("policy", [1]);
   wait(2);
   session.move("stick", [0, 0, 0]);
@@ -83,6 +85,22 @@ test("a pull moves the robot its way, and is over when it is let go", () => {
   assert.ok(robot.simulation.data.xfrc_applied.every((value) => value === 0));
   wait(2);
   assert.equal(session.falls, 0);
+});
+
+test("a push goes where it was aimed, half as hard as the expert bears", () => {
+  session.begin({ seed: 1, task: 0 });
+  wait(0.5);
+  const [forward, backward, sideways] = constants.tasks.trot.push_limit;
+  for (const [angle, limit] of [[0, forward], [Math.PI, backward], [Math.PI / 2, sideways], [-Math.PI / 2, sideways]]) {
+    assert.ok(Math.abs(largestPush(constants.tasks.trot, angle) - limit) < 1e-9);
+    const { data, yaw } = robot.simulation, before = Array.from(data.qvel.slice(0, 2)), aim = angle + yaw;
+    session.move("push", [Math.round(1000 * aim), 50]);
+    assert.ok(Math.abs(data.qvel[0] - before[0] - 0.5 * limit * Math.cos(aim)) < 2e-3);
+    assert.ok(Math.abs(data.qvel[1] - before[1] - 0.5 * limit * Math.sin(aim)) < 2e-3);
+  }
+  const diagonal = largestPush({ push_limit: [3, 1, 4] }, Math.atan2(4, 3));
+  assert.ok(Math.abs(diagonal - 5 / Math.SQRT2) < 1e-9, "(3, 4) / sqrt(2) lies on the ellipse of 3 and 4");
+  assert.equal(largestPush({ push_limit: [0, 1, 1] }, 0), 0);
 });
 
 test("links that hold no tour are refused", () => {

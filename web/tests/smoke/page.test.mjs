@@ -1,17 +1,16 @@
-/** The built page in a real browser: keys, buttons, dragging, touch, links. Needs a Chromium; CHROMIUM names another. */
+/** The built page in a real browser: keys, buttons, dragging, touch, links. Needs a Chromium. */
 import assert from "node:assert/strict";
-import { existsSync, mkdirSync } from "node:fs";
+import { mkdirSync } from "node:fs";
 import test, { after, before } from "node:test";
 import { fileURLToPath } from "node:url";
 import puppeteer from "puppeteer-core";
 
 import { serve } from "../../serve.mjs";
+import { browserOptions, chromium } from "./chromium.mjs";
 
-const chromium = process.env.CHROMIUM ?? ["/usr/bin/chromium", "/usr/bin/google-chrome", "/usr/bin/chromium-browser"].find(existsSync);
 const pictures = fileURLToPath(new URL("../../build/pictures/", import.meta.url));
 const skip = chromium === undefined ? "no Chromium on this machine" : false;
-const GPU = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"];
-const PATIENCE_MS = 60000;
+const PATIENCE_MS = 1000 * Number(process.env.PATIENCE_S ?? 60); // of every wait: software draws slowly
 let server, browser, address, errors;
 
 before(async () => {
@@ -19,7 +18,7 @@ before(async () => {
   mkdirSync(pictures, { recursive: true });
   server = await serve();
   address = `http://127.0.0.1:${server.address().port}/`;
-  browser = await puppeteer.launch({ executablePath: chromium, headless: true, protocolTimeout: 180000, args: ["--no-sandbox", ...GPU] });
+  browser = await puppeteer.launch({ ...browserOptions(), protocolTimeout: 3 * PATIENCE_MS });
 });
 after(async () => {
   await browser?.close();
@@ -27,12 +26,13 @@ after(async () => {
 });
 
 /** A page that was opened, with its robot in motion. */
-async function open({ path = "", viewport = { width: 740, height: 480 } } = {}) {
+async function open({ path = "", viewport = { width: 740, height: 500 }, calm = false } = {}) {
   errors = [];
   const page = await browser.newPage();
   page.on("pageerror", (error) => errors.push(error.message));
   page.on("console", (message) => message.type() === "error" && errors.push(message.text()));
   await page.setViewport(viewport);
+  if (calm) await page.emulateMediaFeatures([{ name: "prefers-reduced-motion", value: "reduce" }]);
   await page.evaluateOnNewDocument(listen);
   await page.goto(address + path, { timeout: PATIENCE_MS });
   await until(page, () => document.getElementById("gait").textContent.trim() !== "");
@@ -51,7 +51,7 @@ async function choose(page, key, gait) {
 
 /** In the page: keep what the worker says of the robot, however seldom the page is drawn. */
 function listen() {
-  const forget = () => ({ low: [0, 0, 0], high: [0, 0, 0], mean: [0, 0, 0], falls: 0, pulls: 0 });
+  const forget = () => ({ low: [0, 0, 0], high: [0, 0, 0], mean: [0, 0, 0], falls: 0, pulls: 0, steps: 0 });
   window.seen = forget();
   window.forget = () => (window.seen = forget());
   window.Worker = class extends Worker {
@@ -64,6 +64,7 @@ function listen() {
         seen.low = seen.low.map((value, i) => Math.min(value, seen.mean[i]));
         seen.high = seen.high.map((value, i) => Math.max(value, seen.mean[i]));
         seen.falls = data.falls;
+        seen.steps += 1;
         seen.pulls += data.pulled !== null;
       });
     }
@@ -95,9 +96,9 @@ test("keys drive it, numbers change its gait", { skip }, async (t) => {
   await page.keyboard.down("ArrowLeft");
   await moving(page, 2, 0.4);
   await page.keyboard.up("ArrowLeft");
-  await page.keyboard.down("d");
+  await page.keyboard.down("e");
   await moving(page, 1, -0.15);
-  await page.keyboard.up("d");
+  await page.keyboard.up("e");
   const rate = Number((await text(page, "rate")).slice(2));
   t.diagnostic(`${rate} x real time`);
   assert.ok(rate > 0.3);
@@ -112,10 +113,17 @@ test("pause stops time, slow motion slows it, reset begins anew", { skip }, asyn
   }, low, high);
   await page.keyboard.press("Space");
   await rate(0, 0);
-  await page.keyboard.press("t");
+  const steps = await page.evaluate(() => window.seen.steps);
+  await page.keyboard.press("n");
+  await until(page, (before) => window.seen.steps === before + 1, steps);
+  await page.keyboard.press("-");
+  await page.keyboard.press("-");
+  assert.equal(await text(page, "speed"), "0.25 ×");
   await page.click("#pause");
   await rate(0.1, 0.3);
-  await page.keyboard.press("t");
+  await page.keyboard.press("=");
+  await page.keyboard.press("=");
+  assert.equal(await text(page, "speed"), "1 ×");
   await page.keyboard.press("r");
   await until(page, () => document.getElementById("message").textContent === "");
   await done(page, "reset");
@@ -126,7 +134,7 @@ test("dragging the robot pushes it", { skip }, async () => {
   await page.keyboard.press("r");
   await until(page, () => document.querySelectorAll(".wanted td")[0].textContent === "0.00");
   await page.evaluate(() => window.forget());
-  await page.mouse.move(370, 232);
+  await page.mouse.move(370, 241);
   await page.mouse.down();
   await page.mouse.move(560, 160, { steps: 3 });
   await until(page, () => window.seen.pulls > 0 && (window.seen.falls > 0 || Math.max(...window.seen.high.slice(0, 2), ...window.seen.low.slice(0, 2).map(Math.abs)) > 0.03));
@@ -135,14 +143,49 @@ test("dragging the robot pushes it", { skip }, async () => {
   await done(page, "pushed");
 });
 
+test("a key pushes it away from the camera", { skip }, async () => {
+  const page = await open();
+  await page.keyboard.press("r");
+  await until(page, () => document.querySelectorAll(".wanted td")[0].textContent === "0.00");
+  await page.keyboard.press("c");
+  assert.equal(await page.$eval("#camera", (select) => select.value), "follow");
+  await page.evaluate(() => window.forget());
+  await page.keyboard.press("p"); // the camera stands behind it, on its right
+  await until(page, () => window.seen.high[0] > 0.05 && window.seen.high[1] > 0.05);
+  await done(page, "key_push");
+});
+
+test("who asks for little motion sees a robot that stands", { skip }, async () => {
+  const page = await open({ calm: true });
+  assert.match(await text(page, "message"), /little motion/);
+  assert.equal(await page.$eval("#camera", (select) => select.value), "follow");
+  await page.keyboard.press("l");
+  await until(page, () => location.hash.startsWith("#tour="));
+  await done(page, "calm");
+});
+
+test("a button that Tab reached is pressed by Space, and names itself", { skip }, async () => {
+  const page = await open();
+  await page.focus("#help");
+  await page.keyboard.press("Space");
+  await until(page, () => document.getElementById("keys").open);
+  const nameless = await page.evaluate(() => [...document.querySelectorAll("button, select, canvas")].filter((each) => !each.textContent.trim() && !each.getAttribute("aria-label")).map((each) => each.id));
+  assert.deepEqual(nameless, []);
+  assert.equal(await text(page, "state"), "", "Space did not pause as well");
+  await page.keyboard.press("w"); // a key that drives closes it
+  await until(page, () => !document.getElementById("keys").open);
+  await done(page, "focus");
+});
+
 test("the student without a clock takes over", { skip }, async () => {
   const page = await open();
   await until(page, () => !document.getElementById("policy").options[1].disabled);
-  await page.select("#policy", "1");
-  await page.select("#compare", "expert");
+  await page.keyboard.press("t");
+  await page.keyboard.press("g");
+  assert.equal(await page.$eval("#compare", (select) => select.value), "expert");
   await page.keyboard.down("w");
   await moving(page, 0, 0.6);
-  assert.equal(await page.$eval("#policy", (select) => select.value), "1");
+  assert.equal(await page.$eval("#policy", (select) => select.value), "phase_free");
   await done(page, "phase_free");
 });
 
@@ -185,7 +228,10 @@ test("the help opens and closes", { skip }, async () => {
   await page.keyboard.press("h");
   await until(page, () => document.getElementById("keys").open);
   await page.screenshot({ path: `${pictures}help.png` });
-  await page.keyboard.press("Escape");
-  await until(page, () => !document.getElementById("keys").open);
+  for (const key of ["Escape", "h"]) {
+    await page.keyboard.press(key);
+    await until(page, () => !document.getElementById("keys").open);
+    if (key === "Escape") await page.keyboard.press("h");
+  }
   await done(page, "help_closed");
 });
