@@ -3,7 +3,7 @@ import { MOUSE, PerspectiveCamera, TOUCH, Vector3 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
 /** Behind the robot and turning with it; beside it, not turning; where it was put. */
-export const MODES = ["chase", "follow", "free"];
+const MODES = ["chase", "follow", "free"];
 const FOLLOW_S = 0.12; // time constant of its way after the robot, so that steps do not shake it
 const AIM_HEIGHT = 0.22; // of the point that is looked at [m]
 const UP = new Vector3(0, 0, 1);

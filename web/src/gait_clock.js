@@ -11,11 +11,6 @@ export function asksToStand(gait, command, { stand_command: small }) {
   return gait.can_stand && command.every((value, i) => Math.abs(value) < small[i]);
 }
 
-/** Whether the clock rests. */
-export function isStanding(gait, phase, command, clock) {
-  return phase === 0 && asksToStand(gait, command, clock);
-}
-
 /** The clock [cycles], in [0, 1), after some time under one filtered command. */
 export function nextPhase(gait, phase, command, seconds, clock) {
   const turns = phase + seconds / gait.period;

@@ -1,7 +1,7 @@
 /** Networks as products of typed arrays; weights are those of `trainers.policies`, in float32. */
 
 /** Tensors of a file by their names. */
-export function tensors({ tensors: shapes, bytes }, buffer) {
+function tensors({ tensors: shapes, bytes }, buffer) {
   if (buffer.byteLength !== bytes) throw new Error(`weights of ${bytes} bytes were expected, got ${buffer.byteLength}`);
   const named = {};
   let offset = 0;

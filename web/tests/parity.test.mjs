@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 
-import { drive } from "../src/script.js";
+import { drive } from "./script.mjs";
 import { makeController, makeRobot, readReference } from "./load.mjs";
 
 const POLICY = 1e-6, OBSERVATION = 1e-6, POSITION_M = 0.01;
