@@ -6,7 +6,6 @@ import test from "node:test";
 
 import { demo } from "../src/demo.js";
 import { between, Playback } from "../src/playback.js";
-import { Stick } from "../src/stick.js";
 import { decode, encode } from "../src/tour_code.js";
 import { withoutSections } from "../wasm_sections.mjs";
 import { constants } from "./load.mjs";
@@ -35,21 +34,12 @@ test("pictures move evenly between the physics' messages", () => {
   assert.ok(Math.abs(playback.next(0.01)[0] - 0.02) < 1e-6, "a robot that begins anew is where it begins");
 });
 
-test("keys, sticks and pads add up to no more than a full stick", () => {
-  const stick = new Stick();
-  stick.key("KeyW", true, false);
-  stick.key("ArrowUp", true, false);
-  stick.touch = [0.5, -0.25, 0];
-  assert.deepEqual(stick.percent, [100, -25, 0]);
-  stick.key("KeyS", true, false);
-  stick.key("ArrowUp", false, false);
-  assert.deepEqual(stick.percent, [50, -25, 0]);
-  stick.release();
-  stick.readPad({ axes: [0.05, -1, 0.5, 0], buttons: [] });
-  assert.deepEqual(stick.percent.map((value) => value + 0), [100, 0, -50]);
-  stick.readPad(undefined);
-  stick.key("KeyQ", true, true);
-  assert.deepEqual(stick.percent, [0, 0, 50]);
+test("a picture of time that stands still is the last step's", () => {
+  const playback = new Playback();
+  playback.add([frame(0.02), frame(0.04)]);
+  playback.next(0);
+  playback.catchUp();
+  assert.ok(Math.abs(playback.next(0)[0] - 0.04) < 1e-6);
 });
 
 test("integers of every size come back from a link", () => {
