@@ -13,5 +13,5 @@ export function demo(constants) {
     events.push([step, "stick", move.command.map((value, i) => Math.round((100 * value) / range[i]))]);
   }
   events.push([Math.round(seconds * constants.control_hz), "end", []]);
-  return { seed: 1, task: names.indexOf(moves[0].task), events };
+  return { seed: 1, task: names.indexOf(moves[0].task), events, punctual: false };
 }

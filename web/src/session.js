@@ -35,13 +35,17 @@ export class Session {
   /**
    * Stand up, and begin a new tour.
    *
-   * @param how `seed` of the joints' positions, indices of `task` and `policy`, and `events` of a tour to drive again.
+   * @param how `seed` of the joints' positions, indices of `task` and `policy`, and `events` of a tour to drive again;
+   *   `punctual` says what happens while the network that they need is on its way: time stands still, or they are late.
+   * @throws if the tour asks for a gait or a policy that there is not.
    */
-  begin({ seed, task, policy = 0, events = [] }) {
+  begin({ seed, task, policy = 0, events = [], punctual = true }) {
+    this.#check([[0, "button", [task]], [0, "policy", [policy]], ...events]);
     this.random = generator(seed);
     this.start = { seed, task };
     this.events = [];
     this.replayed = events;
+    this.punctual = punctual;
     this.step = 0;
     this.stick = [0, 0, 0];
     this.pulled = null;
@@ -95,7 +99,7 @@ export class Session {
    * Let a control period pass.
    *
    * @param beforePhysicsStep called with the number of each physics step, before it.
-   * @returns whether it could: a gait whose network is still on its way holds a tour up.
+   * @returns whether it could: a gait whose network is still on its way holds a punctual tour up.
    */
   tick(beforePhysicsStep = () => {}) {
     if (!this.#replay()) return false;
@@ -110,6 +114,15 @@ export class Session {
     return true;
   }
 
+  #check(events) {
+    for (const [, kind, [index]] of events) {
+      const known = { button: this.tasks, policy: this.names }[kind];
+      if (known !== undefined && known[index] === undefined) {
+        throw new Error(`the tour asks for number ${index} of ${known.join(", ")}, counted from 0`);
+      }
+    }
+  }
+
   get #controlS() {
     return 1 / this.robot.constants.control_hz;
   }
@@ -117,13 +130,20 @@ export class Session {
   #replay() {
     while (this.replaying && this.replayed[0][0] <= this.step) {
       const [, kind, values] = this.replayed[0];
-      if (kind === "button" && !this.isReady(this.tasks[values[0]])) return false;
-      if (kind === "policy" && !this.controllers[this.names[values[0]]].isReady(this.robot.episode.task.gait.name)) {
-        return false;
+      if (!this.#canDo(kind, values)) {
+        if (!this.punctual) this.replayed = this.replayed.map(([step, ...move]) => [step + 1, ...move]);
+        return !this.punctual;
       }
       this.replayed = this.replayed.slice(1);
       this.do(kind, values);
     }
+    return true;
+  }
+
+  /** Whether the network that a move needs is there. */
+  #canDo(kind, [index]) {
+    if (kind === "button") return this.isReady(this.tasks[index]);
+    if (kind === "policy") return this.controllers[this.names[index]].isReady(this.robot.episode.task.gait.name);
     return true;
   }
 

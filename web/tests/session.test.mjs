@@ -109,6 +109,14 @@ test("links that hold no tour are refused", () => {
   assert.throws(() => decode(encode({ weights: WEIGHTS, seed: 1, task: 0, events: [[3, "stick", [1, 2, 3]]] }).slice(0, -2)), /cut off/);
 });
 
+test("a tour through a gait that there is not is refused, and nothing is changed", () => {
+  session.begin({ seed: 1, task: 0 });
+  assert.throws(() => session.begin({ seed: 2, task: 0, events: [[10, "button", [6]]] }), /number 6 of trot, bound/);
+  assert.throws(() => session.begin({ seed: 2, task: 7 }), /number 7 of trot/);
+  assert.throws(() => session.begin({ seed: 2, task: 0, events: [[0, "policy", [2]]] }), /number 2 of multi_head/);
+  assert.equal(session.start.seed, 1);
+});
+
 test("a gait whose network is on its way holds a tour up", () => {
   const heads = robot.controller.student?.heads ?? session.controllers.multi_head.student.heads;
   const { walk } = heads;
@@ -119,4 +127,15 @@ test("a gait whose network is on its way holds a tour up", () => {
   heads.walk = walk;
   wait(0.5);
   assert.equal(robot.episode.requestedTask.gait.name, "walk");
+});
+
+test("the demonstration goes on without a network that is on its way, and is late", () => {
+  const { heads } = session.controllers.multi_head.student, { walk } = heads;
+  delete heads.walk;
+  session.begin({ seed: 1, task: 0, events: [[10, "button", [3]], [20, "stick", [10, 0, 0]]], punctual: false });
+  wait(1);
+  assert.deepEqual([session.step, session.replayed.map(([step]) => step)], [50, [50, 60]]);
+  heads.walk = walk;
+  wait(0.22);
+  assert.deepEqual(session.tour.events.map(([step, kind]) => [step, kind]), [[50, "button"], [60, "stick"], [61, "end"]]);
 });
