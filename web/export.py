@@ -156,8 +156,8 @@ def _task(task: Any) -> dict[str, Any]:
 
 def _robot() -> dict[str, Any]:
     names = (
-        "LEGS", "JOINTS", "HOME_POSE", "STANDING_HEIGHT", "THIGH_LENGTH", "CALF_LENGTH", "HIP_TO_THIGH", "HIP_POSITION_B",
-        "LEG_SIDE",
+        "LEGS", "JOINTS", "HOME_POSE", "STANDING_HEIGHT", "THIGH_LENGTH", "CALF_LENGTH", "HIP_TO_THIGH",
+        "HIP_POSITION_B", "LEG_SIDE",
     )  # fmt: skip
     return {name.lower(): getattr(robot, name) for name in names}
 
