@@ -113,7 +113,12 @@ test("pause stops time, slow motion slows it, reset begins anew", { skip }, asyn
   }, low, high);
   await page.keyboard.press("Space");
   await rate(0, 0);
-  const steps = await page.evaluate(() => window.seen.steps);
+  const steps = await page.evaluate(async () => {
+    for (let before = -1; before !== window.seen.steps; await new Promise((wake) => setTimeout(wake, 500))) {
+      before = window.seen.steps; // a step may have been under way
+    }
+    return window.seen.steps;
+  });
   await page.keyboard.press("n");
   await until(page, (before) => window.seen.steps === before + 1, steps);
   await page.keyboard.press("-");
