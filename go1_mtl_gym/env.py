@@ -286,8 +286,8 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
         target = finite_vector(self._expert.action(state), 12, "the expert's action [rad]")
         return self.action_map.from_radians(target).astype(np.float32)
 
-    def set_task(self, task: str, phase: float | None = None) -> None:
-        """Change the task while running; the command goes on.
+    def set_task(self, task: str, phase: float | None = None, command: ArrayLike | None = None) -> None:
+        """Change the task while running.
 
         Args:
             task: name of the new one.
@@ -295,14 +295,17 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
                 gaits that leave the ground with all feet go on until the middle of their stance
                 (`Gait.change_phase`), a robot that is faster than half of either task's `command_range` slows down
                 first, and a task that was changed to goes on for a second.
+            command: that is asked for from now on, as in `set_command`; None: the present one goes on.
 
         Raises:
-            InvalidInputError: if the task is unknown here, does not allow the present command, or the phase is none.
+            InvalidInputError: if the task is unknown here or does not allow the command, or the phase is none; nothing
+                is changed then.
         """
         episode = self._running("set_task")
         new = TASKS[one_of(task, self.tasks, "task")]
-        new.check_command(episode.command)
+        command = new.check_command(episode.command if command is None else command)
         episode.change_task(new, None if phase is None else check_phase(phase))
+        episode.change_command(command)
 
     def set_command(self, command: ArrayLike) -> None:
         """Ask for another (vx [m/s], vy [m/s], yaw rate [rad/s]); it is low-passed before expert and student see it.

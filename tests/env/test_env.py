@@ -136,6 +136,19 @@ def test_set_task_begins_the_gait_and_keeps_the_command():
     assert observation[-6:].tolist() == [0, 0, 0, 1, 0, 0] and info["command"].tolist() == [0.3, 0.0, 0.1]
 
 
+def test_a_task_and_a_command_that_the_present_one_does_not_allow_come_together():
+    env = Go1Env("trot")
+    env.reset(seed=0, options={"command": np.multiply((1, 0, 0), TASKS["trot"].command_limit)})
+    beyond = np.multiply((1, 0, 0), TASKS["walk"].command_limit) + (0.1, 0, 0)
+    with pytest.raises(InvalidInputError, match="walk"):
+        env.set_task("walk", command=beyond)
+    with pytest.raises(InvalidInputError, match="walk"):
+        env.set_task("walk")
+    assert env.requested_task.name == "trot" and env.command[0] == TASKS["trot"].command_limit[0]
+    env.set_task("walk", command=(0.2, 0.0, 0.1))
+    assert env.requested_task.name == "walk" and env.command.tolist() == [0.2, 0.0, 0.1]
+
+
 def test_set_command_is_seen_through_the_filter():
     env = Go1Env("trot")
     env.reset(seed=0, options={"command": (0.0, 0.0, 0.0)})

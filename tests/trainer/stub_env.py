@@ -98,8 +98,10 @@ class StubEnv(gymnasium.Env):
     def set_command(self, command) -> None:
         self.command = np.array(command, dtype=float)
 
-    def set_task(self, task: str) -> None:
+    def set_task(self, task: str, phase: float | None = None, command=None) -> None:
         assert task in self.tasks
+        if command is not None:
+            self.set_command(command)
         self.task, self.phase = TASKS[task], 0.0
 
     def push(self, delta_velocity_w) -> None:

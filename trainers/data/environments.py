@@ -53,8 +53,8 @@ class Go1Like(Protocol):
     def set_command(self, command: ArrayLike) -> None:
         """Ask for another (vx [m/s], vy [m/s], yaw rate [rad/s])."""
 
-    def set_task(self, task: str) -> None:
-        """Change the task while running."""
+    def set_task(self, task: str, phase: float | None = None, command: ArrayLike | None = None) -> None:
+        """Change the task, and the command if there is one, while running."""
 
 
 def base_env(env: gymnasium.Env) -> Go1Like:

@@ -101,5 +101,4 @@ class OperatorWrapper(SeededWrapper):
         """Press a button; a command beyond the new task's reach is brought to its border first."""
         env = self._go1
         reach = np.minimum(self._reach(TASKS[task]), env.requested_task.command_limit)
-        env.set_command(np.clip(env.command, -reach, reach))
-        env.set_task(task)
+        env.set_task(task, command=np.clip(env.command, -reach, reach))

@@ -103,9 +103,7 @@ class Script:
         for move in self.moves:
             if round(move.time_s * base.control_hz) == step:
                 if move is not self.moves[0]:
-                    base.set_command((0.0, 0.0, 0.0))  # the old command may be beyond the new task's limit
-                    base.set_task(move.task)
-                    base.set_command(move.command)
+                    base.set_task(move.task, command=move.command)
                 if move.push is not None:
                     push(env, move.push)
 

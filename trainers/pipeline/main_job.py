@@ -1,5 +1,6 @@
 """The main job on the command line, from its options to its last sentence."""
 
+import json
 import shlex
 import time
 from collections.abc import Callable, Mapping
@@ -48,14 +49,11 @@ def run_job(
 
 def all_stages(job: Job) -> dict[str, Any]:
     """The stages in order; pictures only where they can be drawn."""
-    rows, held_out = job.demonstrations()
-    policy = job.dagger(job.clone(rows, held_out), rows, held_out)
-    metrics = job.evaluate({"multi_head": policy, **job.phase_free(policy), **job.baselines()}, held_out)
     try:
-        job.draw(policy, held_out)
+        return job.run()
     except RenderingError as error:
         print(f"no videos: {error}")
-    return metrics
+    return json.loads(job.folder.metrics.read_text(encoding="utf-8"))
 
 
 def next_steps(folder: Path, drive: str) -> Mapping[str, str]:

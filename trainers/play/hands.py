@@ -81,11 +81,12 @@ class Hands:
             step: number of steps that were made.
         """
         go1 = cast(Go1Env, env.unwrapped)
+        task = TASKS[self._task] if self._task in go1.tasks else go1.requested_task
+        command = self._stick * np.array(task.command_range)
         if self._task in go1.tasks:
-            go1.set_command((0.0, 0.0, 0.0))  # the old command may be beyond the new task's limit
-            go1.set_task(self._task)
-        command = self._stick * np.array(go1.requested_task.command_range)
-        go1.set_command(command)
+            go1.set_task(self._task, command=command)
+        else:
+            go1.set_command(command)
         yaw, change = float(go1.state.rpy[2]), np.zeros(2)
         for direction_w, share in self._pushes:
             angle = direction_w - yaw
