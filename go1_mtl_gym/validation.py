@@ -1,10 +1,11 @@
 """Small checks shared by everything that takes numbers from a user."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from difflib import get_close_matches
 from numbers import Real
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -17,6 +18,10 @@ Parameters = TypeVar("Parameters")
 
 _NUMBER_KINDS = "iufO"
 """Kinds of numpy arrays that hold numbers, or things that may be numbers; not booleans, text or complex numbers."""
+
+
+LONGEST_REPR = 60
+"""Characters of a value in a message."""
 
 
 def finite_vector(value: object, size: int, label: str) -> np.ndarray:
@@ -66,7 +71,7 @@ def number_in(value: object, low: float, high: float, label: str) -> float:
     """
     if not isinstance(value, Real) or isinstance(value, bool):
         raise InvalidInputError(f"{label} must be a number in [{low:g}, {high:g}], got {value!r}")
-    number = float(value)
+    number = as_float(value)
     if not low <= number <= high:
         raise InvalidInputError(f"{label} must lie in [{low:g}, {high:g}], got {number:g}")
     return number
@@ -78,10 +83,27 @@ def integer_in(value: object, low: int, high: int, label: str) -> int:
     Raises:
         InvalidInputError: if it is no whole number, or outside the range.
     """
-    whole = isinstance(value, Real) and not isinstance(value, bool) and float(value).is_integer()
+    whole = isinstance(value, Real) and not isinstance(value, bool) and as_float(value).is_integer()
     if not whole or not low <= value <= high:  # type: ignore[operator]
-        raise InvalidInputError(f"{label} must be an integer from {low} to {high}, got {value!r}")
+        raise InvalidInputError(f"{label} must be an integer from {low} to {high}, got {_brief(value)}")
     return int(value)  # type: ignore[call-overload]
+
+
+def as_float(value: Any) -> float:
+    """Return a real number as a float; infinity if it is too large for one."""
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf if value > 0 else -math.inf
+
+
+def _brief(value: object) -> str:
+    """How a message shows a value; of a number with hundreds of digits only the size."""
+    try:
+        text = repr(value)
+    except ValueError:  # more digits than Python writes
+        return "an integer of thousands of digits"
+    return text if len(text) <= LONGEST_REPR else f"{text[:LONGEST_REPR]}... ({len(text)} characters)"
 
 
 class Limits(NamedTuple):

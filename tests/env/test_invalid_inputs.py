@@ -60,6 +60,8 @@ RUNNING = [
     (lambda env: env.set_task("moonwalk"), r"task must be one of .*got 'moonwalk'"),
     (lambda env: env.set_task("walk", phase=1.0), r"phase \[cycles\] must lie in \[0, 1\), got 1"),
     (lambda env: env.set_task("walk", phase=-0.1), r"phase.*got -0.1"),
+    (lambda env: env.set_task("walk", phase=10**400), r"phase"),
+    (lambda env: env.reset(seed=0, options={"command": (10**400, 0, 0)}), r"command"),
     (lambda env: env.set_task("walk", phase="late"), r"phase.*got 'late'"),
     (lambda env: env.set_command((0.1, 0.2)), r"command \(vx, vy, yaw rate\) must have shape \(3,\), got shape \(2,\)"),
     (lambda env: env.set_command((9.0, 0.0, 0.0)), r"command.*'trot' must lie within.*got \[9.0, 0.0, 0.0\]"),

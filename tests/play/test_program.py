@@ -123,6 +123,7 @@ def test_an_episode_of_a_certificate_is_filmed(tmp_path, capsys):
         (["--script", "a.json", "--task", "trot"], "--script says everything; beside it came --task"),
         (["--script", "a.json", "--save-script", "b.json"], "beside it came --save-script"),
         (["--seed", "-1"], "seed"),
+        (["phase_free", "--policy", "clocked"], "one policy can drive: 'phase_free' came, and --policy as well"),
         (["--size", "0", "90"], "width of the picture [pixels] must be an integer from 1"),
     ],
 )
@@ -131,6 +132,57 @@ def test_what_cannot_be_done_is_one_sentence(options, message, capsys, tmp_path,
     assert run(["play", *options]) == 2
     error = capsys.readouterr().err
     assert message in error and error.startswith("error: ") and error.count("\n") == 1
+
+
+def test_without_a_display_nothing_that_hands_would_do_is_left_out_in_silence(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("trainers.play.program.has_display", lambda: False)
+    for option in (["--task", "jump"], ["--save-script", str(tmp_path / "x.json")]):
+        assert run(["play", "--record", str(tmp_path / "x.png"), *option]) == 2
+        assert f"beside it came {option[0]}" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_certificate_of_an_older_policy_of_the_package_is_not_replayed_with_this_one(tmp_path, capsys):
+    trainers.certify("clocked", tmp_path, tasks=("walk",), conditions=("drawn",), episodes=1, seconds=0.1)
+    file = tmp_path / "certificate.json"
+    values = json.loads(file.read_text())
+    file.write_text(json.dumps(values | {"policy": {"name": "clocked", "sha256": "0" * 64}}))
+    asked = ["play", "--replay", str(tmp_path), "--episode", "drawn/walk/0", "--record", str(tmp_path / "x.png")]
+    assert run(asked) == 2
+    assert "another clocked than this package's: --policy FILE" in capsys.readouterr().err
+    assert not (tmp_path / "x.png").exists()
+
+
+class Unplugged:
+    """A window in which somebody drives half a second and presses Ctrl-C."""
+
+    def __init__(self, player, width, height):
+        self.player = player
+
+    def picture(self):
+        return picture(self.player.session.steps % 200, 1280, 720)
+
+    def run(self, each):
+        self.player.hands.move_stick((1.0, 0.0, 0.0))
+        for _ in range(25):
+            self.player.session.step()
+            each()
+        raise KeyboardInterrupt
+
+    def close(self):
+        pass
+
+
+def test_what_was_driven_and_filmed_is_kept_when_interrupted(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("trainers.play.window.Window", Unplugged)
+    monkeypatch.setattr("trainers.play.program.has_display", lambda: True)
+    tape, film = tmp_path / "tape.json", tmp_path / "film.gif"
+    assert run(["play", "--save-script", str(tape), "--record", str(film)]) == 130
+    script = trainers.Script.read(tape)
+    assert script.seconds == 0.5 and script.moves[0].command[0] > 0.5
+    with Image.open(film) as image:
+        assert image.size == (640, 360)
+    assert f"{tape} has what you did" in capsys.readouterr().out
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems always have a display")

@@ -86,6 +86,37 @@ def test_a_session_begins_again_where_it_began(student):
         assert session.reading.task == "pace"
 
 
+def test_a_refused_reset_changes_nothing(student):
+    with Session(student, EpisodeSetup("pace", 1, 10.0, command=(1.3, 0.0, 0.0))) as session:
+        session.step()
+        with pytest.raises(InvalidInputError, match="walk"):
+            session.reset("walk")
+        session.step()
+        assert session.steps == 2 and session.reading.task == "pace"
+        session.reset()
+        assert session.steps == 0 and session.reading.task == "pace"
+
+
+@pytest.mark.parametrize(
+    ("values", "message"), [(("hop", 1, 1.0), "task"), (("trot", -1, 1.0), "seed"), (("trot", 1, 0.0), "seconds")]
+)
+def test_impossible_episodes_are_refused(values, message):
+    with pytest.raises(InvalidInputError, match=message):
+        EpisodeSetup(*values)
+
+
+def test_a_tape_is_full_after_ten_minutes_and_driving_goes_on(student):
+    hands = Hands()
+    with Session(student, STANDING, hands.drive) as session:
+        session.step()
+        for step in (29_998, 29_999, 30_000, 40_000):
+            hands.move_stick((step / 50_000, 0.0, 0.0))
+            hands.drive(session.env, step)
+        command = session.go1.command[0]
+    assert command == pytest.approx(0.8 * TASKS["trot"].command_range[0])
+    assert hands.script.seconds == 600.0 and hands.script.moves[-1].time_s == pytest.approx(599.98)
+
+
 def test_what_hands_did_is_a_script_that_does_it_again(student):
     hands = Hands()
     with Session(student, STANDING, hands.drive) as session:
@@ -118,6 +149,9 @@ def test_a_script_is_read_from_the_file_that_it_was_written_to(tmp_path):
         (tmp_path / "x.json").write_text(text)
         with pytest.raises(InvalidInputError, match="x.json' is no script"):
             Script.read(tmp_path / "x.json")
+    (tmp_path / "x.json").write_text("[" * 100_000)
+    with pytest.raises(InvalidInputError, match="nested too deep"):
+        Script.read(tmp_path / "x.json")
     with pytest.raises(InvalidInputError, match="no script"):
         Script.read(tmp_path / "y.json")
 
@@ -162,6 +196,8 @@ def test_a_push_changes_the_velocity_in_the_direction_that_is_looked_at(student,
         (lambda hands: hands.move_stick((1.0, 0.0)), "stick"),
         (lambda hands: hands.move_stick((float("nan"), 0.0, 0.0)), "finite"),
         (lambda hands: hands.push(0.0, -1.0), "share of the largest push"),
+        (lambda hands: hands.push(float("nan")), "direction of a push .* must be finite"),
+        (lambda hands: hands.push(None), "direction of a push"),
         (lambda hands: hands.script, "at least one"),
     ],
 )

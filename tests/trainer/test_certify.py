@@ -1,6 +1,8 @@
 """Certificates on a scripted environment: verdicts, causes, files that go on, pairs, films."""
 
 import json
+import subprocess
+import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -231,6 +233,18 @@ def test_an_interrupted_certificate_keeps_its_finished_cells(tmp_path):
     assert (tmp_path / "certificate.md").read_text(encoding="utf-8") == done.markdown()
 
 
+def test_two_processes_do_not_write_one_certificate(tmp_path):
+    lock = "import filelock, sys; a = filelock.FileLock(sys.argv[1]); a.acquire(); print(flush=True); sys.stdin.read()"
+    with subprocess.Popen(
+        [sys.executable, "-c", lock, str(tmp_path / ".lock")], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as other:
+        other.stdout.readline()
+        with pytest.raises(InvalidInputError, match="another process is at work in"):
+            certify(Stepping(), tmp_path, conditions=("drawn",), **FEW)
+        assert not (tmp_path / "certificate.json").exists()
+    assert certify(Stepping(), tmp_path, conditions=("drawn",), **FEW).cells
+
+
 @pytest.mark.parametrize(
     ("agent", "changed", "message"),
     [
@@ -275,6 +289,10 @@ def test_a_file_that_is_no_certificate_is_refused(tmp_path):
     (tmp_path / "certificate.json").write_text('{"cells": []}', encoding="utf-8")
     with pytest.raises(InvalidInputError, match="certificate"):
         certify(Stepping(), tmp_path, conditions=("drawn",), **FEW)
+    values = certify(Stepping(), conditions=("drawn",), **FEW).as_dict()
+    for policy in ("clocked", {}, None):
+        with pytest.raises(InvalidInputError, match="a certificate was expected"):
+            Certificate.from_dict(values | {"policy": policy})
 
 
 # -- Whom it takes -----------------------------------------------------------------------------------------------------

@@ -198,6 +198,11 @@ def test_evaluate_drives_and_writes_every_episode(tmp_path, capsys):
     assert scores["tasks"]["walk"]["episodes"][0]["commands"] == [[0.3, 0.0, -0.1]]
     assert scores["policy"]["name"] == "clocked"
     assert ended(["evaluate", str(tmp_path / "none.zip")]) == 2 and "none.zip" in capsys.readouterr().err
+    file = str(tmp_path / "y.json")
+    beyond_jump = ["evaluate", "--tasks", "pace", "jump", "--episodes", "1", "--command", "2", "0", "0", "--out", file]
+    assert ended(beyond_jump) == 2
+    told = capsys.readouterr()
+    assert "'jump' must lie within" in told.err and not told.out, "before pace was measured"
 
 
 def test_collect_makes_shards_once(tmp_path, capsys):

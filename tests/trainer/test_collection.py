@@ -180,6 +180,20 @@ def test_jobs_must_differ(tmp_path):
         collect_all([CollectJob("trot", 0)] * 2, tmp_path, make_env=make_stub)
 
 
+@pytest.mark.parametrize(
+    ("second", "n_jobs", "message"),
+    [
+        (CollectJob("walk", 1, 1.0, (3.0, 0.0, 0.0)), 1, "walk"),
+        (CollectJob("walk", 1, 0.001), 1, "at least a control period, 0.02 s, got 0.001"),
+        (CollectJob("walk", 1, 1.0), 0, "n_jobs"),
+    ],
+)
+def test_what_cannot_be_is_refused_before_the_first_shard(tmp_path, second, n_jobs, message):
+    with pytest.raises(InvalidInputError, match=message):
+        collect_all([CollectJob("trot", 0, 1.0), second], tmp_path, n_jobs, make_env=make_stub)
+    assert not list(tmp_path.iterdir())
+
+
 def test_worker_processes_make_the_same_shards(tmp_path):
     jobs = [CollectJob("trot", s, 1.0) for s in range(2)]
     here = collect_all(jobs, tmp_path / "here", make_env=make_stub)

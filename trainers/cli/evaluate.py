@@ -52,13 +52,18 @@ def run(words: Sequence[str]) -> None:
     options = parse(Options, words, "evaluate")
     if options.out is not None:
         writable_file(options.out)
+    from go1_mtl_gym import TASKS
     from trainers import evaluate
     from trainers.evaluation.agents import identity, opened
 
     agent = opened(options.policy)
     results = {}
     robot: dict[str, Any] = {} if options.robot is None else {"robot": options.robot}
-    for task in options.tasks or tasks_of(agent):
+    tasks = tuple(dict.fromkeys(options.tasks)) or tasks_of(agent)
+    if options.command is not None:
+        for task in tasks:  # before the first one is measured
+            TASKS[task].check_command(options.command)
+    for task in tasks:
         results[task] = evaluate(
             agent,
             task,

@@ -5,6 +5,7 @@ from typing import Annotated, Any
 
 import tyro
 
+from go1_mtl_gym.errors import InvalidInputError
 from trainers.cli.names import GaitName
 from trainers.cli.options import parse, unchecked, values_of
 from trainers.play.options import PlayOptions
@@ -19,6 +20,8 @@ Options: Any = unchecked(
 def run(words: Sequence[str]) -> None:
     """Let somebody play, or film what is played."""
     if words and not words[0].startswith("-"):  # evaluate and certify take a policy so
+        if any(word.split("=")[0] == "--policy" for word in words):
+            raise InvalidInputError(f"one policy can drive: {words[0]!r} came, and --policy as well")
         words = ["--policy", *words]
     options = PlayOptions(**values_of(parse(Options, words, "play")))
     from trainers.play.program import play

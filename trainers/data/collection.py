@@ -16,6 +16,7 @@ from threadpoolctl import threadpool_limits
 from go1_mtl_gym.contract import PolicyContract, terms_of
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
 from go1_mtl_gym.sensing.observation import ObservationLayout
+from go1_mtl_gym.tasks import TASKS
 from go1_mtl_gym.validation import finite_vector
 from trainers.data.demonstrations import Demonstrations
 from trainers.data.environments import EnvFactory, PerturbationConfig, WithTasks, base_env, derive_seed, make_env
@@ -23,7 +24,7 @@ from trainers.data.stateful import Learner
 from trainers.utils.files import json_form
 from trainers.utils.processes import keep_interrupts
 from trainers.utils.progress import Bar
-from trainers.utils.validation import checked_seed, positive
+from trainers.utils.validation import checked_jobs, checked_seed, positive
 
 BEFORE_FALL_S = 0.24
 """The last seconds before a fall are not worth imitating and are dropped [s]."""
@@ -178,7 +179,7 @@ def watch(
 def _record(env: gymnasium.Env, job: CollectJob, act: Callable[[np.ndarray, bool], np.ndarray]) -> Demonstrations:
     """The rows of a job: what was seen, and what `act` made of it; it also drives, and is told of each beginning."""
     base = base_env(env)
-    wanted = round(job.seconds * base.control_hz)
+    wanted = _rows(job, base.control_hz)
     obs_rows: list[np.ndarray] = []
     act_rows: list[np.ndarray] = []
     starts: list[int] = []
@@ -235,9 +236,9 @@ def collect_all(
 
     Raises:
         ShardMismatchError: if a shard of that name was made from another description.
-        InvalidInputError: if two jobs have one name.
+        InvalidInputError: if two jobs have one name, or one asks for what its environment or task does not allow.
     """
-    jobs = list(jobs)
+    jobs, n_jobs = list(jobs), checked_jobs(n_jobs)
     paths = [Path(out_dir) / f"{job.name}.npz" for job in jobs]
     if len(set(paths)) < len(paths):
         raise InvalidInputError(f"jobs must differ in task, kind or seed, got {sorted(job.name for job in jobs)}")
@@ -271,7 +272,23 @@ def _contracts(jobs: Sequence[CollectJob], make_env: EnvFactory) -> dict[str, Po
         env = make_env(job.task, job.perturbation, **{"episode_s": EPISODE_S, **job.env_kwargs})
         contracts[setting] = base_env(env).contract
         env.close()
+    for job in jobs:
+        _rows(job, contracts[_setting(job)].control_hz)
+        if job.command is not None and job.task in TASKS:
+            TASKS[job.task].check_command(job.command)
     return contracts
+
+
+def _rows(job: CollectJob, control_hz: float) -> int:
+    """How many rows a job asks for.
+
+    Raises:
+        InvalidInputError: if it is none.
+    """
+    rows = round(job.seconds * control_hz)
+    if rows < 1:
+        raise InvalidInputError(f"seconds must be at least a control period, {1 / control_hz:g} s, got {job.seconds:g}")
+    return rows
 
 
 def _is_done(job: CollectJob, path: Path, contract: PolicyContract, make_env: EnvFactory) -> bool:

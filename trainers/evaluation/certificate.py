@@ -1,7 +1,6 @@
 """What `trainers.certify` finds out, as one value, one JSON file and one page."""
 
 import dataclasses
-import json
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
@@ -12,7 +11,7 @@ from go1_mtl_gym.validation import one_of
 from trainers.evaluation.cells import Cell, Settings
 from trainers.evaluation.certificate_page import page
 from trainers.evaluation.stopping import MET
-from trainers.utils.files import json_form
+from trainers.utils.files import json_form, read_json
 
 FILE = "certificate.json"
 
@@ -74,7 +73,8 @@ class Certificate:
         try:
             settings = Settings(**values["settings"])
             cells = tuple(Cell.from_dict(each) for each in values["cells"])
-            return cls(values["policy"], settings, values["versions"], cells, values["reference"])
+            policy, reference = _identity(values["policy"]), values["reference"]
+            return cls(policy, settings, values["versions"], cells, reference and _identity(reference))
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise InvalidInputError(f"a certificate was expected, got something else ({error!r})") from error
 
@@ -86,8 +86,9 @@ class Certificate:
             InvalidInputError: if there is no such file, or it holds something else.
         """
         file = Path(path) / FILE if Path(path).is_dir() else Path(path)
-        try:
-            values = json.loads(file.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise InvalidInputError(f"{str(file)!r} is no certificate: {error}") from error
-        return cls.from_dict(values)
+        return cls.from_dict(read_json(file, "certificate"))
+
+
+def _identity(values: Any) -> dict[str, str]:
+    """Name and digest of a policy, from JSON."""
+    return {name: str(values[name]) for name in ("name", "sha256")}

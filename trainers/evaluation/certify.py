@@ -24,6 +24,7 @@ from trainers.evaluation.episodes import EpisodeSetup
 from trainers.evaluation.rollout import run_all
 from trainers.policies.checkpoint import versions
 from trainers.utils.files import write_atomically, write_json
+from trainers.utils.folder_lock import alone_in
 from trainers.utils.validation import checked_jobs, refuse_overridden
 
 PAGE = "certificate.md"
@@ -81,7 +82,8 @@ def certify(
         env_kwargs: of the environment, on top of the policy's own ``env_kwargs``; JSON values or frozen dataclasses.
 
     Raises:
-        InvalidInputError: if an argument is not as described, or `out` holds the certificate of something else.
+        InvalidInputError: if an argument is not as described, or `out` holds the certificate of something else or is in
+            use by another process.
     """
     refuse_overridden(env_kwargs, episode_s="seconds and tour_seconds", task="tasks")
     agent, other = opened(policy_or_expert), None if reference is None else opened(reference)
@@ -99,8 +101,10 @@ def certify(
     theirs = None if reference is None else identity(reference)
     empty = Certificate(identity(policy_or_expert), settings, versions(), (), theirs)
     measuring = _Measuring(settings, agent, other, checked_jobs(n_jobs), progress, make_env)
-    certificate = _fill(empty, asked, measuring, None if out is None else Path(out))
-    if out is not None:
+    if out is None:
+        return _fill(empty, asked, measuring, None)
+    with alone_in(Path(out)):
+        certificate = _fill(empty, asked, measuring, Path(out))
         write_json(Path(out) / FILE, certificate.as_dict())
         write_atomically(Path(out) / PAGE, lambda file: file.write(certificate.markdown().encode()))
     return certificate

@@ -8,11 +8,13 @@ import gymnasium
 import numpy as np
 
 from go1_mtl_gym import TASKS
+from go1_mtl_gym.validation import one_of
 from trainers.data.environments import EnvFactory, base_env, derive_seed
 from trainers.data.operator import OperatorConfig
 from trainers.data.operator_wrapper import OperatorWrapper
 from trainers.evaluation.rollout import Rollout, opened
 from trainers.evaluation.scoring import EpisodeRecord, Series, score
+from trainers.utils.validation import checked_seed, positive
 
 Watch = Callable[[gymnasium.Env, int], None]
 """Called with the environment and the number of steps that were made, before each of them and once at the end."""
@@ -30,6 +32,9 @@ class EpisodeSetup:
         command_interval: a new command is drawn every so many seconds; None keeps the first.
         corners: whether commands are drawn from the corners of the task's range.
         operator: whose hands drive instead, or None.
+
+    Raises:
+        InvalidInputError: if task, seed or duration cannot be.
     """
 
     task: str
@@ -39,6 +44,11 @@ class EpisodeSetup:
     command_interval: float | None = None
     corners: bool = False
     operator: OperatorConfig | None = None
+
+    def __post_init__(self) -> None:
+        one_of(self.task, tuple(TASKS), "task")
+        checked_seed(self.seed)
+        positive(self.seconds, "seconds")
 
     def play(
         self,

@@ -101,6 +101,6 @@ def film_failures(certificate: Certificate, policy_or_expert: Any, folder: Path,
 
 def _parts(episode: str) -> tuple[str, str, int]:
     parts = episode.split("/") if isinstance(episode, str) else ()
-    if len(parts) != 3 or not parts[2].isdigit():
+    if len(parts) != 3 or not (parts[2].isascii() and parts[2].isdigit()):
         raise InvalidInputError(f'an episode is "condition/task/number", such as "operator/trot/17", got {episode!r}')
     return parts[0], parts[1], int(parts[2])

@@ -1,10 +1,8 @@
 """What a person does with a stick and gait buttons, written down: the same moves for every policy."""
 
 import dataclasses
-import json
 from collections.abc import Mapping, Sequence
 from os import PathLike
-from pathlib import Path
 from typing import Any, cast
 
 import gymnasium
@@ -15,9 +13,10 @@ from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.rotations import yaw_matrix
 from go1_mtl_gym.validation import finite_vector, number_in, one_of, parameters_of
 from trainers.data.environments import base_env
-from trainers.utils.files import write_json
+from trainers.utils.files import read_json, write_json
 
 LONGEST_S = 600.0
+"""Of a script [s]."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -100,8 +99,9 @@ class Script:
             step: number of steps that were made.
         """
         base = base_env(env)
+        last_step = round(self.seconds * base.control_hz) - 1  # the end is no time for a move
         for move in self.moves:
-            if round(move.time_s * base.control_hz) == step:
+            if min(round(move.time_s * base.control_hz), last_step) == step:
                 if move is not self.moves[0]:
                     base.set_task(move.task, command=move.command)
                 if move.push is not None:
@@ -114,10 +114,7 @@ class Script:
         Raises:
             InvalidInputError: if there is no such file, or it holds something else.
         """
-        try:
-            values = json.loads(Path(path).read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise InvalidInputError(f"{str(path)!r} is no script: {error}") from error
+        values = read_json(path, "script")
         if not isinstance(values, dict) or not {"moves", "seconds"} <= set(values):
             raise InvalidInputError(f"{str(path)!r} is no script: an object with moves and seconds was expected")
         return parameters_of(values, cls, f"the script {str(path)!r}")

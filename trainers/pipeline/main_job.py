@@ -13,6 +13,7 @@ from trainers.pipeline.job import Job
 from trainers.pipeline.summary import summary
 from trainers.utils.cli import interpreter
 from trainers.utils.files import write_atomically
+from trainers.utils.folder_lock import alone_in
 from trainers.utils.report import results_table
 
 Stages = Callable[[Job], dict[str, Any]]
@@ -33,15 +34,16 @@ def run_job(
         table: print the table of all gaits and learners, too.
 
     Raises:
-        InvalidInputError: as of `Job`.
+        InvalidInputError: as of `Job`, or if another process is at work in the folder.
         KeyboardInterrupt: says how to go on.
     """
     folder = Path(time.strftime("runs/%Y-%m-%d_%H-%M-%S")) if out is None else out
-    job = Job(config, folder, command=command, progress=True)
-    try:
-        metrics = (stages or all_stages)(job)
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(f"what is done is kept, go on with: --out {shlex.quote(str(folder))}") from None
+    with alone_in(folder):
+        job = Job(config, folder, command=command, progress=True)
+        try:
+            metrics = (stages or all_stages)(job)
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(f"what is done is kept, go on with: --out {shlex.quote(str(folder))}") from None
     results = results_table(metrics) + "\n"
     write_atomically(folder / "table.md", lambda file: file.write(results.encode()))
     print("\n".join(["", *([results] if table else []), summary(metrics, folder, next_steps(folder, drive))]))

@@ -7,7 +7,7 @@ import numpy as np
 
 from go1_mtl_gym import TASKS, Go1Env
 from go1_mtl_gym.validation import finite_vector, number_in, one_of
-from trainers.evaluation.script import Move, Script, push
+from trainers.evaluation.script import LONGEST_S, Move, Script, push
 
 PUSH_SHARE = 0.5
 """Of a push, as a share of the largest one that the expert bears in the present gait and that direction."""
@@ -29,7 +29,7 @@ class Hands:
 
     @property
     def script(self) -> Script:
-        """What was done since the last reset: who begins with the same seed and drives by it goes the same way.
+        """What was done since the last reset, for as long as a script can be: who drives by it goes the same way.
 
         Raises:
             InvalidInputError: if nothing was driven yet.
@@ -67,7 +67,8 @@ class Hands:
         Raises:
             InvalidInputError: if a number is none.
         """
-        self._pushes.append((float(direction_w), number_in(share, 0.0, 3.0, "share of the largest push")))
+        direction = finite_vector([direction_w], 1, "direction of a push [rad]").item()
+        self._pushes.append((direction, number_in(share, 0.0, 3.0, "share of the largest push")))
 
     def let_go(self) -> None:
         """Leave the stick to its springs, and forget what was to happen."""
@@ -97,9 +98,11 @@ class Hands:
         self._write_down(step, go1, command, change)
 
     def _write_down(self, step: int, go1: Go1Env, command: np.ndarray, change: np.ndarray) -> None:
-        """Remember what was done, if it differs from what was done before."""
+        """Remember what was done, if it differs from what was done before and a script has room for it."""
         if step == 0:
             self._moves = []
+        if (step + 1) * go1.control_s > LONGEST_S:
+            return
         forward, left, turn = command.tolist()
         pushed = (float(change[0]), float(change[1])) if change.any() else None
         move = Move(step * go1.control_s, go1.requested_task.name, (forward, left, turn), pushed)

@@ -60,7 +60,17 @@ class PlayOptions:
             raise InvalidInputError(
                 '--replay FILE and --episode NAME belong together, such as --episode "operator/trot/17"'
             )
-        driven = "--script" if self.script is not None else "--replay" if self.replay is not None else ""
-        for name in ("task", "save_script", *(("seed",) if self.replay is not None else ())):
-            if driven and getattr(self, name) is not None:
-                raise InvalidInputError(f"{driven} says everything; beside it came --{name.replace('_', '-')}")
+        if self.script is not None or self.replay is not None:
+            self.refuse_hands(f"{'--script' if self.replay is None else '--replay'} says everything")
+        if self.replay is not None and self.seed is not None:
+            raise InvalidInputError("--replay says everything; beside it came --seed")
+
+    def refuse_hands(self, reason: str) -> None:
+        """Refuse what is of use only where hands drive.
+
+        Raises:
+            InvalidInputError: if it was asked for; the message begins with the reason.
+        """
+        for name in ("task", "save_script"):
+            if getattr(self, name) is not None:
+                raise InvalidInputError(f"{reason}; beside it came --{name.replace('_', '-')}")

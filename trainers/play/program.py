@@ -9,11 +9,11 @@ from tqdm.auto import tqdm
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.rendering import has_display
 from go1_mtl_gym.validation import one_of
-from trainers.evaluation.agents import opened
+from trainers.evaluation.agents import identity, opened
 from trainers.evaluation.certificate import Certificate
 from trainers.evaluation.episodes import EpisodeSetup
 from trainers.evaluation.replay import certified_episode
-from trainers.evaluation.script import Script
+from trainers.evaluation.script import LONGEST_S, Script
 from trainers.evaluation.tour import DEFAULT_TOUR
 from trainers.play.hands import Hands
 from trainers.play.options import PlayOptions
@@ -38,10 +38,12 @@ def play(options: PlayOptions) -> None:
     Raises:
         Go1Error: if a file is not as described, or nothing can be shown on this machine.
     """
-    film = None if options.record is None else FilmFile(writable_file(options.record), options.fps)
+    largest = FILM_SIZE if options.size is None else None
+    film = None if options.record is None else FilmFile(writable_file(options.record), options.fps, largest)
     tape = None if options.save_script is None else writable_file(options.save_script)
     script = None if options.script is None else Script.read(options.script)
     if film is not None and script is None and options.replay is None and not has_display():
+        options.refuse_hands("without a display --record films a tour, --script FILE another one")
         print("no display: filming the tour of the package; --script FILE films another one", file=sys.stderr)
         script = DEFAULT_TOUR
     session, hands, title = _session(options, script)
@@ -50,11 +52,14 @@ def play(options: PlayOptions) -> None:
         player.ghost = options.ghost
         if film is not None and hands is None:
             _film(player, film, options.size or (FILM_SIZE if film.waits else LARGE_FILM_SIZE))
-        else:
+            return
+        try:
             _play(player, film, options.size or (1280, 720))
-    if tape is not None and hands is not None and session.steps:
-        hands.script.write(tape)
-        print(f"{tape} has what you did: --script {tape} does it again")
+        finally:  # interrupted, or the physics has diverged: what was driven is kept
+            if tape is not None and hands is not None and session.steps:
+                hands.script.write(tape)
+                kept = f"the first {LONGEST_S / 60:g} minutes of " if session.time_s > LONGEST_S else ""
+                print(f"{tape} has {kept}what you did: --script {tape} does it again")
 
 
 def _session(options: PlayOptions, script: Script | None) -> tuple[Session, Hands | None, str]:
@@ -82,6 +87,11 @@ def _replayed(file: Path, episode: str, named: str | None) -> tuple[Session, Non
     name = certificate.policy["name"] if named is None else named
     if named is None and name not in (*PRETRAINED, EXPERT):
         raise InvalidInputError(f"the certificate is of {name}: say where it is, --policy FILE")
+    if named is None and identity(name) != certificate.policy:
+        raise InvalidInputError(
+            f"the certificate is of another {name} than this package's: --policy FILE names it, and --policy {name} "
+            "shows this one in the same episode"
+        )
     agent = opened(name)
     arguments = certificate.settings.arguments(agent, cell.condition)
     student = None if isinstance(agent, str) else agent
@@ -101,12 +111,10 @@ def _play(player: Player, film: FilmFile | None, size: tuple[int, int]) -> None:
     window = Window(player, *size)
     try:
         window.run(each=Recording(player, film, window.picture) if film is not None else lambda: None)
+        if film is not None and film.is_still:
+            film.add(window.picture())
+    finally:  # interrupted, too: a film has what was seen until then
         if film is not None:
-            if film.is_still:
-                film.add(window.picture())
             film.close()
             print(film.summary)
-    finally:
-        if film is not None:
-            film.discard()
         window.close()

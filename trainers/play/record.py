@@ -34,13 +34,15 @@ class FilmFile:
     Args:
         path: of the file; its ending says what it becomes, one of `KINDS`.
         fps: pictures per second.
+        largest: width and height [pixels] that pictures of a film that `waits` are brought down to, whose memory they
+            fill; None leaves them as they come.
 
     Raises:
         InvalidInputError: if the ending is another, or MP4s cannot be written here.
     """
 
-    def __init__(self, path: str | os.PathLike[str], fps: int = 25) -> None:
-        self.path, self.fps = Path(path), integer_in(fps, 1, MAX_FPS, "fps")
+    def __init__(self, path: str | os.PathLike[str], fps: int = 25, largest: tuple[int, int] | None = None) -> None:
+        self.path, self.fps, self._largest = Path(path), integer_in(fps, 1, MAX_FPS, "fps"), largest
         one_of(self.path.suffix.lower(), KINDS, f"ending of the film {str(path)!r}")
         self._kind = self.path.suffix.lower()
         if self._kind == ".mp4":
@@ -63,6 +65,8 @@ class FilmFile:
     @property
     def summary(self) -> str:
         """What there is in the file, in a sentence."""
+        if not self.count:
+            return f"{self.path} was not written: there was no picture"
         return f"{self.path} is there" if self.is_still else f"{self.path} has {self.count} pictures"
 
     @property
@@ -74,8 +78,8 @@ class FilmFile:
         """Take in the next picture, RGB, uint8, shape (h, w, 3); all become as large as the first one."""
         if self.is_full:
             return
-        if self._size is None:  # encoders want even numbers
-            self._size = (picture.shape[1] // 2 * 2, picture.shape[0] // 2 * 2)
+        if self._size is None:
+            self._size = self._fitting(picture.shape[1], picture.shape[0])
         width, height = self._size
         if picture.shape[0] - height not in (0, 1) or picture.shape[1] - width not in (0, 1):
             picture = np.asarray(Image.fromarray(picture).resize(self._size))  # the window's size was changed
@@ -94,9 +98,16 @@ class FilmFile:
             self._encoder.send(None)
         self._encoder.send(picture)
 
+    def _fitting(self, width: int, height: int) -> tuple[int, int]:
+        """Width and height of the film [pixels]; encoders want even numbers."""
+        shrink = 1.0
+        if self._largest is not None and self.waits:
+            shrink = min(1.0, self._largest[0] / width, self._largest[1] / height)
+        return max(2, int(shrink * width) // 2 * 2), max(2, int(shrink * height) // 2 * 2)
+
     @property
     def _unfinished(self) -> Path:
-        return self.path.with_name(f".{self.path.stem}.{os.getpid()}.mp4")
+        return self.path.with_name(f".{os.getpid()}.unfinished.mp4")
 
     def close(self) -> None:
         """Write the file; without a picture there is none."""

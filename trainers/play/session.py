@@ -9,7 +9,7 @@ from typing import Any, cast
 import gymnasium
 import numpy as np
 
-from go1_mtl_gym import Go1Env
+from go1_mtl_gym import TASKS, Go1Env
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.validation import one_of
 from trainers.data.environments import EnvFactory, make_env
@@ -82,14 +82,17 @@ class Session:
             task: to begin in, another than the setup's; None keeps it.
 
         Raises:
-            InvalidInputError: if it is unknown here.
+            InvalidInputError: if it is unknown here, or does not allow the setup's command; the episode goes on then.
         """
+        setup = self._setup
         if task is not None:
-            self._setup = dataclasses.replace(self._setup, task=one_of(task, self.go1.tasks, "task"))
-        self._commands = DrawnCommands(self._setup)
-        agent = EXPERT if self._student is None else self._student
+            setup = dataclasses.replace(setup, task=one_of(task, self.go1.tasks, "task"))
+            if setup.command is not None:
+                TASKS[task].check_command(setup.command)
+        commands, agent = DrawnCommands(setup), EXPERT if self._student is None else self._student
         self._ask_student: Callable[[np.ndarray], np.ndarray] = controller(agent, self.go1)  # with an empty memory
-        self._obs, info = begin(self.env, agent, self._setup.seed, self._commands.options)
+        self._obs, info = begin(self.env, agent, setup.seed, commands.options)
+        self._setup, self._commands = setup, commands
         self._told.clear()
         self._told.append(info)
         self._expert_action: np.ndarray | None = None

@@ -25,6 +25,6 @@ def load(path: str | PathLike[str], device: torch.device | str = "cpu") -> Multi
         CheckpointError: if the file is missing, damaged, or something else.
     """
     where, checkpoint = checked_device(device), read_checkpoint(path)
-    if checkpoint.kind not in KINDS:
+    if not isinstance(checkpoint.kind, str) or checkpoint.kind not in KINDS:
         raise CheckpointError(f"{path} holds a policy of kind {checkpoint.kind!r}; this package knows {sorted(KINDS)}")
     return rebuild(KINDS[checkpoint.kind], checkpoint, path, where)

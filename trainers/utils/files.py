@@ -22,7 +22,7 @@ def write_atomically(path: str | os.PathLike[str], write: Callable[[BinaryIO], o
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{uuid.uuid4().hex}.tmp")
+    temporary = path.with_name(f".{uuid.uuid4().hex}.tmp")  # a name as long as may be leaves no room for more
     try:
         with open(temporary, "xb") as file:
             write(file)
@@ -38,6 +38,24 @@ def write_json(path: str | os.PathLike[str], value: Any) -> None:
     """Write `json_ready` of a value atomically, indented."""
     text = json.dumps(json_ready(value), indent=1) + "\n"
     write_atomically(path, lambda file: file.write(text.encode()))
+
+
+def read_json(path: str | os.PathLike[str], kind: str) -> Any:
+    """Values of a JSON file.
+
+    Args:
+        path: of the file.
+        kind: what the file should be, in the message, such as "script".
+
+    Raises:
+        InvalidInputError: if there is no such file, or it holds something else than JSON.
+    """
+    try:
+        return json.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InvalidInputError(f"{os.fspath(path)!r} is no {kind}: {error}") from error
+    except RecursionError:
+        raise InvalidInputError(f"{os.fspath(path)!r} is no {kind}: its brackets are nested too deep") from None
 
 
 def json_ready(value: Any) -> Any:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.validation import integer_in
+from go1_mtl_gym.validation import as_float, integer_in
 
 
 def positive(value: object, name: str) -> float:
@@ -17,7 +17,7 @@ def positive(value: object, name: str) -> float:
     Raises:
         InvalidInputError: if it is something else.
     """
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real) or not 0 < float(value) < math.inf:
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, Real) or not 0 < as_float(value) < math.inf:
         raise InvalidInputError(f"{name} must be a finite number > 0, got {value!r}")
     return float(value)
 
