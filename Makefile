@@ -2,7 +2,8 @@
 # make test         installs into .venv; lint, types and tests       make test PYTEST_ARGS="tests/env -x"
 # make test-newest  the same tests on the newest gymnasium and stable-baselines3, in .venv-newest
 # make docs         builds the documentation into docs/_build         open docs/_build/index.html
-# make web          builds the page for the browser into web/build/site, and tests it; needs Node 20 and npm
+# make web          builds the page for the browser into web/build/site; needs Node 20 and npm
+# make web-test     tests it against Python's robot, and in Chromium where there is one
 # make web-serve    serves that page                                   open http://localhost:8080/
 # make clean        removes both environments and everything built
 #
@@ -23,7 +24,7 @@ test test-newest: export OMP_NUM_THREADS = 1
 test test-newest: export OPENBLAS_NUM_THREADS = 1
 test test-newest: export MKL_NUM_THREADS = 1
 
-.PHONY: dagger test test-newest docs web web-serve needs-node clean
+.PHONY: dagger test test-newest docs web web-test web-serve needs-node clean
 
 dagger: .venv/.installed
 	.venv/bin/python examples/dagger.py $(ARGS)
@@ -39,10 +40,12 @@ test-newest: .venv-newest/.installed-test
 docs: .venv/.installed-docs
 	.venv/bin/python -m sphinx -E -W --keep-going -q -b html docs docs/_build
 
-# Python writes what the page needs and what it is tested with; everything in web/build is made anew by this.
+# Python writes what the page needs and what it is tested with; everything in web/build is made anew by these.
 web: needs-node .venv/.installed web/node_modules/.package-lock.json
 	.venv/bin/python -m web.export $(ARGS)
 	cd web && npm run --silent build
+
+web-test: web
 	.venv/bin/python -m web.reference $(ARGS)
 	cd web && npm run --silent test && npm run --silent smoke
 

@@ -69,7 +69,7 @@ def test_films_of_other_kinds_are_refused(tmp_path):
 
 def test_mp4_without_its_library_says_what_to_do(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    with pytest.raises(InvalidInputError, match=r"pip install go1-mtl-gym\[video\]"):
+    with pytest.raises(InvalidInputError, match="pip install imageio-ffmpeg"):
         FilmFile(tmp_path / "x.mp4")
 
 
@@ -113,6 +113,7 @@ def test_an_episode_of_a_certificate_is_filmed(tmp_path, capsys):
     [
         (["--policy", "nothing.zip"], "no policy at nothing.zip"),
         (["nothing.zip"], "no policy at nothing.zip"),
+        (["expret"], "no policy at expret: there is no such file; did you mean 'expert'?"),
         (["--task", "hop"], "gait must be one of 'trot'"),
         (["--script", "nothing.json"], "is no script"),
         (["--replay", "nothing.json"], "belong together"),

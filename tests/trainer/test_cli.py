@@ -193,7 +193,9 @@ def test_evaluate_drives_and_writes_every_episode(tmp_path, capsys):
     out = tmp_path / "scores.json"
     words = ["evaluate", "--tasks", "walk", "--episodes", "1", "--seconds", "3", "--command", "0.3", "0", "-0.1"]
     assert run([*words, "--out", str(out)]) == 0
-    assert re.match(r"walk: [01] of 1 episodes of 3 s succeed .*, 1 survive, ", capsys.readouterr().out)
+    told = capsys.readouterr().out
+    assert told.startswith("1 episodes of 3 s per gait, with the command 0.3 0 -0.1; seed 1\nwalk: ")
+    assert re.search(r"walk: [01] of 1 episodes of 3 s succeed .*, 1 survive, ", told)
     scores = json.loads(out.read_text())
     assert scores["tasks"]["walk"]["episodes"][0]["commands"] == [[0.3, 0.0, -0.1]]
     assert scores["policy"]["name"] == "clocked"

@@ -79,7 +79,10 @@ def run(words: Sequence[str]) -> None:
     except KeyboardInterrupt:
         raise KeyboardInterrupt(f"finished cells are in {out}; the same command goes on") from None
     met = sum(cell.verdict == "met" for cell in certificate.cells)
-    print(f"{met} of {len(certificate.cells)} claims are met; {out / 'certificate.md'} has them all")
+    for cell in certificate.cells:
+        print(f"{cell.name}: {cell.verdict}, {cell.survived} of {cell.trials} survived, {cell.succeeded} succeeded")
+    nothing = " A quick run is too short to show any." if quick else ""
+    print(f"{met} of {len(certificate.cells)} claims are met; {out / 'certificate.md'} has them all.{nothing}")
     if videos:
         from trainers.evaluation.replay import film_failures
 

@@ -63,6 +63,7 @@ def run(words: Sequence[str]) -> None:
     if options.command is not None:
         for task in tasks:  # before the first one is measured
             TASKS[task].check_command(options.command)
+    print(f"{options.episodes} episodes of {options.seconds:g} s per gait, {driven(options)}; seed {options.seed}")
     for task in tasks:
         results[task] = evaluate(
             agent,
@@ -83,6 +84,17 @@ def run(words: Sequence[str]) -> None:
         scores = {task: result.as_dict() for task, result in results.items()}
         write_json(options.out, {"policy": identity(options.policy), "seed": options.seed, "tasks": scores})
         print(f"every episode is in {options.out}")
+
+
+def driven(options: Options) -> str:
+    """Whose commands the robot gets, in a few words."""
+    if options.hands:
+        return "in an operator's hands"
+    if options.command is not None:
+        return "with the command {:g} {:g} {:g}".format(*options.command)
+    kind = "a drawn corner of the range" if options.corners else "a drawn command"
+    again = "" if options.command_interval is None else f", anew every {options.command_interval:g} s"
+    return f"with {kind} each{again}"
 
 
 def tasks_of(agent: Any) -> tuple[str, ...]:

@@ -27,12 +27,12 @@ HELP = (
     ("1 - 6", "gait (or click on it)"),
     ("P, Shift P", "push away from you, harder"),
     ("T", "student or expert"),
-    ("G", "ghost: the pose that the expert wants"),
+    ("G", "ghost of the expert's pose"),
     ("Space, N", "pause, one step on"),
     ("- =", "slower, faster"),
     ("R", "stand up again"),
     ("C", "camera: chase, follow, free"),
-    ("mouse", "rotate, pan (right), zoom (wheel)"),
+    ("mouse", "turn, shift, zoom the view"),
     ("H, Esc", "this help, quit"),
 )
 """Keys and what they do, as the player reads it."""

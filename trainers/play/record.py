@@ -139,7 +139,7 @@ def _ffmpeg() -> Any:
         import imageio_ffmpeg
     except ImportError:
         raise InvalidInputError(
-            "MP4s are written by imageio-ffmpeg, which is not installed: pip install go1-mtl-gym[video], or name a "
+            "MP4s are written by imageio-ffmpeg, which is not installed: pip install imageio-ffmpeg, or name a "
             ".webp or .gif file"
         ) from None
     return imageio_ffmpeg

@@ -20,8 +20,8 @@ from trainers.play.player import Player
 from trainers.play.session import EXPERT
 
 STATUS_HEIGHT = 44.0
-HELP_ROW = 15.0
-HELP_WIDTH = 312.0
+HELP_ROW = 14.0
+HELP_WIDTH = 240.0
 EXPERT_COLOR = (255, 196, 84, 255)
 
 
@@ -103,13 +103,13 @@ def _line(page: Page, words: str) -> Panel:
 
 
 def _help(page: Page) -> Panel:
-    """The keys, in the middle."""
-    height = HELP_ROW * len(HELP) + 14
-    x, y = (page.width - HELP_WIDTH) / 2, (page.height - height) / 2
+    """The keys, at the right between status and feet, where they leave the robot to be seen."""
+    height = HELP_ROW * len(HELP) + 8
+    x, y = page.width - HELP_WIDTH - MARGIN, BUTTONS[1] + STATUS_HEIGHT + 2
     pen = page.pen(x, y, HELP_WIDTH, height)
     pen.box(x, y, HELP_WIDTH, height, (*PANEL[:3], 235), 8)
     for row, (keys, meaning) in enumerate(HELP):
-        middle = y + 7 + HELP_ROW * (row + 0.5)
-        pen.text(x + 104, middle, keys, 12, COMMAND, "rm")
-        pen.text(x + 116, middle, meaning, 12, TEXT)
+        middle = y + 4 + HELP_ROW * (row + 0.5)
+        pen.text(x + 86, middle, keys, 11, COMMAND, "rm")
+        pen.text(x + 94, middle, meaning, 11, TEXT)
     return pen.panel()

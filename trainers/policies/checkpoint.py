@@ -17,6 +17,8 @@ import torch
 from gymnasium.spaces import Box
 
 from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.validation import did_you_mean
+from trainers.policies.packaged import PRETRAINED
 from trainers.policies.upgrade import upgraded
 from trainers.utils.files import write_atomically
 
@@ -186,7 +188,8 @@ def _existing(path: object) -> Path:
         raise InvalidInputError(f"path must be a string or a path, got {path!r}")
     file = Path(path)
     if not file.is_file():
-        raise CheckpointError(f"no policy at {file}: there is no such file")
+        hint = did_you_mean(str(file), (*PRETRAINED, "expert"))
+        raise CheckpointError(f"no policy at {file}: there is no such file{hint}")
     return file
 
 

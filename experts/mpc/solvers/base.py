@@ -46,5 +46,5 @@ def optional(name: str) -> ModuleType:
     try:
         return import_module(name)
     except ImportError as error:
-        message = f"the MPC's solver {name!r} needs the package {name}: pip install 'go1-mtl-gym[solvers]'"
+        message = f"the MPC's solver {name!r} needs the package {name}: pip install {name}"
         raise ImportError(message) from error
