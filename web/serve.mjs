@@ -14,7 +14,11 @@ const SITE = join(dirname(fileURLToPath(import.meta.url)), "build", "site");
 /** A server of a folder on the loopback interface; port 0 is any free one. */
 export function serve(port = 0, folder = SITE) {
   const server = createServer((request, response) => {
-    const path = normalize(decodeURIComponent(new URL(request.url, "http://localhost").pathname));
+    const path = asked(request.url);
+    if (path === null) {
+      response.writeHead(400).end("no address");
+      return;
+    }
     const file = join(folder, path.endsWith("/") ? join(path, "index.html") : path);
     if (!file.startsWith(folder) || !existsSync(file) || !statSync(file).isFile()) {
       response.writeHead(404).end("not found");
@@ -24,6 +28,16 @@ export function serve(port = 0, folder = SITE) {
     createReadStream(file).pipe(createGzip({ level: 1 })).pipe(response);
   });
   return new Promise((resolve) => server.listen(port, "127.0.0.1", () => resolve(server)));
+}
+
+/** The path that a request asks for; null if there is none in it. */
+function asked(address) {
+  try {
+    const path = normalize(decodeURIComponent(new URL(address, "http://localhost").pathname));
+    return path.includes("\0") ? null : path;
+  } catch {
+    return null;
+  }
 }
 
 if (process.argv[1] === fileURLToPath(import.meta.url)) {
