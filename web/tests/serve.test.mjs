@@ -1,6 +1,7 @@
 import assert from "node:assert/strict";
 import { request } from "node:http";
 import test from "node:test";
+import { fileURLToPath } from "node:url";
 
 import { serve } from "../serve.mjs";
 
@@ -10,7 +11,7 @@ const status = (port, path) => new Promise((resolve, reject) => {
 });
 
 test("an address that is none is answered, and the server goes on", async () => {
-  const server = await serve(0, import.meta.dirname);
+  const server = await serve(0, fileURLToPath(new URL(".", import.meta.url)));
   const { port } = server.address();
   assert.equal(await status(port, "/%"), 400);
   assert.equal(await status(port, "/%00"), 400);
