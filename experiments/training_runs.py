@@ -18,7 +18,10 @@ from trainers.pipeline.new_policy import new_policy
 from trainers.policies.checkpoint import versions
 from trainers.utils.files import write_json
 
-UNUSED = ("preset", "n_envs", "device", "threads", "episodes", "video_s")
+UNUSED = (
+    *("preset", "n_envs", "device", "threads", "episodes", "video_s"),
+    *("phase_free_s", "phase_free_history", "phase_free_steps"),
+)
 """Settings of the main job that its policies do not depend on, run as here."""
 HELD_OUT = "held_out.json"
 """File of the one-step errors on held-out rows, and of the time; the last that a run writes."""
@@ -42,7 +45,7 @@ QUICK_JOB = {
 
 @dataclass(frozen=True)
 class TrainingRun:
-    """The main job without baselines, evaluation and pictures, on one thread of one process.
+    """The main job's policy with a clock, without evaluation and pictures, on one thread of one process.
 
     Its folder's name stands for its settings and the code: made again, it is read; interrupted, it goes on. Bars and
     messages go to ``progress.log``. A main job with equal settings on one thread gives an equal policy.
@@ -66,11 +69,6 @@ class TrainingRun:
     def policy(self) -> Path:
         """File of the policy."""
         return self.folder / "policy.zip"
-
-    @property
-    def phase_free(self) -> Path:
-        """File of the same without a clock, if the settings ask for one."""
-        return self.folder / "phase_free.zip"
 
     @property
     def held_out(self) -> dict[str, dict[str, float]]:
@@ -99,7 +97,6 @@ class TrainingRun:
         job = Job(dataclasses.replace(self.config, **defaults | {"n_envs": 1}), self.folder)
         train, held_out = job.demonstrations()
         policy = job.dagger(job.clone(train, held_out), train, held_out)
-        job.phase_free(policy)
         errors = trainers.offline_metrics(policy, held_out)
         write_json(self.folder / HELD_OUT, {"tasks": errors, "seconds": round(sum(job.folder.seconds.values()), 1)})
 

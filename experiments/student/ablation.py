@@ -42,7 +42,6 @@ REDUCED = {
     "dagger_s": 60.0,
     "clone_steps": 3000,
     "round_steps": 1500,
-    "phase_free_s": 0.0,
     "round_episodes": 1,
     "episode_s": 10.0,
 }
@@ -127,7 +126,7 @@ class Ablation(Study):
         seconds=3.0,
         command_interval=2.0,
         transitions=TransitionOptions(1, 0.5, 2.5),
-        reduced=PRESETS["smoke"] | {"tasks": ("trot", "bound"), "phase_free_s": 0.0, "round_episodes": 1},
+        reduced=PRESETS["smoke"] | {"tasks": ("trot", "bound"), "round_episodes": 1},
     )
     code = (*EVALUATION_CODE, "experiments.student.transitions", "experiments.training_runs")
 

@@ -1,4 +1,4 @@
-"""How well policies of several training seeds follow commands that change, inside their ranges and in the corners."""
+"""How well policies of several training seeds follow commands that change, and an operator's hands."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -6,18 +6,17 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from experiments import plots
-from experiments.agents import EXPERT, PHASE_FREE, SHARED, STUDENT, Agent
+from experiments.agents import EXPERT, SHARED, STUDENT, Agent
 from experiments.results import Group, Results, group
 from experiments.stats import Rate
-from experiments.student.episodes import drawn
+from experiments.student.episodes import drawn, operated
 from experiments.study import EVALUATION_CODE, Cell, Metrics, Study, option
 from experiments.tables import count, judged, markdown, number
 from experiments.training_runs import TrainedPolicy, TrainingRun, changed
 from trainers.pipeline.config import JobConfig
 
-DRAWN, CORNERS, CORRECTED = "drawn", "corners", "drawn, clock with correction"
-"""Commands from the inside of the range, from its corners, and from its inside for a policy whose clock is its own and
-is corrected at every step by less than the whole estimate."""
+DRAWN, CORNERS, HANDS = "drawn", "corners", "in hands"
+"""Commands from the inside of the range, from its corners, and an operator's hands."""
 SEEDS = {"agent": STUDENT, "condition": DRAWN}
 """Values of the records of the main job's policies, one per training seed."""
 TARGETS = {"success_rate": 0.95, "velocity_error": 0.05, "error_ratio": 2.0}
@@ -26,15 +25,13 @@ TARGETS = {"success_rate": 0.95, "velocity_error": 0.05, "error_ratio": 2.0}
 
 @dataclass(frozen=True)
 class CommandedOptions:
-    """Drawn commands, from a standing start."""
+    """Drawn commands and hands, from a standing start."""
 
     seeds: tuple[int, ...] = option((0, 1, 2, 3, 4), "of the trainings")
-    episodes: int = option(100, "of each kind, per gait and policy")
-    corner_episodes: int = option(20, "of each kind, per gait and policy")
-    phase_free_episodes: int = option(20, "of each kind, per gait and policy")
+    episodes: int = option(50, "with drawn commands, and as many in hands, per gait and policy")
+    corner_episodes: int = option(20, "with commands from the corners, per gait and policy")
     seconds: float = option(30.0, "duration of each [s]")
     command_interval: float = option(5.0, "time between commands [s]")
-    correction: float = option(0.5, "of the clocks that are corrected, see trainers.PhaseFreePolicy")
     job: JobConfig = option(JobConfig(), "of the trainings; its seed is not used")
 
 
@@ -46,37 +43,32 @@ class Commanded(Study):
     note = (
         "Successful episodes with a new command every few seconds, of the main job's students for several training "
         "seeds together, then of the worst seed; mean velocity error, that of the worst seed, the expert's, and the "
-        "largest ratio of a seed's to it; the same with commands from the corners of the ranges; of the students "
-        "without a clock; and of these with a clock of their own that they correct by half at every step. Bold misses "
+        "largest ratio of a seed's to it; the same with commands from the corners of the ranges, and in the hands of "
+        "an operator that keeps to the gait. Bold misses "
         f"a target: success {TARGETS['success_rate']:.0%}, velocity error {TARGETS['velocity_error']:g} m/s, "
         f"{TARGETS['error_ratio']:g} times the expert's."
     )
     caption = "Success per gait and training seed, and velocity errors beside the expert's"
     full = CommandedOptions()
-    quick = CommandedOptions((0,), 1, 1, 1, 3.0, 2.0, job=JobConfig.from_preset("smoke", tasks=("trot", "bound")))
-    code = (*EVALUATION_CODE, "experiments.student.phase", "experiments.training_runs")
+    quick = CommandedOptions((0,), 1, 1, 3.0, 2.0, job=JobConfig.from_preset("smoke", tasks=("trot", "bound")))
+    code = (*EVALUATION_CODE, "experiments.training_runs")
 
     def agents(self) -> list[Agent]:
-        root, policies, phase_free = self.cache / "training", [], []
-        for seed in self.options.seeds:
-            run = TrainingRun(replace(self.options.job, seed=seed), root)
-            policies.append(TrainedPolicy(STUDENT, seed, path=run.policy, run=run))
-            if run.config.phase_free_s:
-                phase_free.append(TrainedPolicy(PHASE_FREE, seed, path=run.phase_free, run=run))
+        runs = [
+            TrainingRun(replace(self.options.job, seed=seed), self.cache / "training") for seed in self.options.seeds
+        ]
+        policies = [TrainedPolicy(STUDENT, run.config.seed, path=run.policy, run=run) for run in runs]
         shared = {name: value for name, value in self.options.job.env_kwargs.items() if name in SHARED}
-        return [*policies, *phase_free, Agent(EXPERT, env_kwargs=shared)]
+        return [*policies, Agent(EXPERT, env_kwargs=shared)]
 
     def cells(self, agent: Agent) -> list[Cell]:
-        conditions = (DRAWN, CORRECTED) if agent.name == PHASE_FREE else (DRAWN, CORNERS)
-        return [Cell(task, condition) for task in self.options.job.tasks for condition in conditions]
+        return [Cell(task, condition) for task in self.options.job.tasks for condition in (DRAWN, CORNERS, HANDS)]
 
     def measure(self, agent: Agent, cell: Cell, seed: int) -> Metrics:
-        options, policy = self.options, agent.load()
-        episodes = options.corner_episodes if cell.condition == CORNERS else options.episodes
-        if agent.name == PHASE_FREE:
-            policy = policy.with_correction(options.correction if cell.condition == CORRECTED else 1.0)
-            episodes = options.phase_free_episodes
-        corners = cell.condition == CORNERS
+        options, policy, corners = self.options, agent.load(), cell.condition == CORNERS
+        episodes = options.corner_episodes if corners else options.episodes
+        if cell.condition == HANDS:
+            return operated(policy, cell.task, episodes, options, seed, **agent.env_kwargs)
         return drawn(policy, cell.task, episodes, options, seed, corners=corners, **agent.env_kwargs)
 
     def more(self) -> dict[str, Any]:
@@ -86,13 +78,13 @@ class Commanded(Study):
         rows = []
         for gait, members in group(results.records, "task").items():
             seeds, expert = members.where(**SEEDS), members.where(agent=EXPERT, condition=DRAWN)
-            others = [(STUDENT, CORNERS), (EXPERT, CORNERS), (PHASE_FREE, DRAWN), (PHASE_FREE, CORRECTED)]
+            others = [(agent, condition) for condition in (CORNERS, HANDS) for agent in (STUDENT, EXPERT)]
             success = _success(seeds) if seeds else ["-"] * 3
             tracked = _tracked(seeds, expert.mean("velocity_error"))
             counted = [count(members.where(agent=agent, condition=condition).rate()) for agent, condition in others]
             rows.append([gait, *success, *tracked, *counted])
         header = ["gait", "success", "95 % interval", "worst seed", "velocity error [m/s]", "worst seed's", "expert's"]
-        return markdown([*header, "worst ratio", "corners", "expert's", "without a clock", "own clock"], rows)
+        return markdown([*header, "worst ratio", "corners", "expert's", "in hands", "expert's"], rows)
 
     def figure(self, results: Results) -> Figure:
         success: dict[str, dict[str, Any]] = {"all seeds": {}, "worst seed": {}}

@@ -35,7 +35,7 @@ def drawn(policy: Any, task: str, episodes: int, options: Any, seed: int, **worl
     return counts(trainers.evaluate(policy, task, episodes, options.seconds, seed, **given))
 
 
-def operated(policy: Any, task: str, episodes: int, options: Any, seed: int) -> dict[str, Any]:
+def operated(policy: Any, task: str, episodes: int, options: Any, seed: int, **world: Any) -> dict[str, Any]:
     """Counts of episodes in one gait in an operator's hands.
 
     Args:
@@ -44,9 +44,10 @@ def operated(policy: Any, task: str, episodes: int, options: Any, seed: int) -> 
         episodes: how many.
         options: of a study, with `seconds` [s].
         seed: of the episodes.
+        **world: arguments of the environment.
     """
     hands = OperatorConfig().of_one_gait()
-    return counts(trainers.evaluate(policy, task, episodes, options.seconds, seed, operator=hands))
+    return counts(trainers.evaluate(policy, task, episodes, options.seconds, seed, operator=hands, **world))
 
 
 def evaluate_gaits(policy: Any, job: JobConfig, seed: int, **world: Any) -> dict[str, trainers.ClosedLoopResult]:
