@@ -15,18 +15,29 @@ export class Gamepad {
    * @param actions that its buttons do, by name.
    */
   constructor(stick, actions) {
-    Object.assign(this, { stick, actions, pressed: [] });
+    Object.assign(this, { stick, actions, pressed: [], isAllowed: true });
   }
 
   /** Take in where the sticks of the first gamepad are, and which buttons went down since the last time. */
   poll() {
-    const pad = navigator.getGamepads?.().find((each) => each?.connected) ?? null;
+    const pad = this.#first();
     this.stick.pad = [LEFT_Y, LEFT_X, RIGHT_X].map((axis) => -rested(pad?.axes[axis] ?? 0)); // theirs point down and right
     const pressed = pad === null ? [] : pad.buttons.map((button) => button.pressed);
     for (const [button, [action, ...values]] of Object.entries(BUTTONS)) {
       if (pressed[button] && !this.pressed[button]) this.actions[action](...values);
     }
     this.pressed = pressed;
+  }
+
+  /** The first gamepad whose axes and buttons are known: of others, wheels and pedals, an axis at rest may be a full deflection. */
+  #first() {
+    if (!this.isAllowed) return null;
+    try {
+      return Array.from(navigator.getGamepads?.() ?? []).find((each) => each?.connected && each.mapping === "standard") ?? null;
+    } catch {
+      this.isAllowed = false; // by the page that this one is a part of; nothing changes that
+      return null;
+    }
   }
 }
 

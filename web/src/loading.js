@@ -18,10 +18,14 @@ export class Loading {
     for (const each of [this.simulation, this.student]) each.catch(() => {}); // whoever awaits it hears of a failure
   }
 
-  /** The session, with a network for its first gait alone. */
-  async session(first) {
+  /**
+   * The session, with a network for its first gait alone.
+   *
+   * @param tasks names of the gaits; the first one whose network comes is enough.
+   */
+  async session(tasks) {
     const { policies } = await this.constants;
-    const student = await this.student.then((loaded) => this.#addHead(loaded, first));
+    const student = await this.student.then((loaded) => this.#addFirst(loaded, tasks));
     const simulation = await this.simulation;
     this.clocked = student;
     this.controllers = { multi_head: new Clocked(simulation.constants, student) };
@@ -30,29 +34,44 @@ export class Loading {
   }
 
   /**
-   * Fetch the other networks, one after another.
+   * Fetch the other networks, one after another; one that does not come keeps none that follows.
    *
    * @param tasks names of the gaits.
    * @param came called with the kind of thing that came, "gait" or "policy", and its name.
+   * @param missing called likewise with what did not come, and the reason.
    */
-  async rest(tasks, came) {
+  async rest(tasks, came, missing) {
+    const attempt = (kind, name, work) => work().then(() => came(kind, name), ({ message }) => missing(kind, name, message));
     for (const name of tasks.filter((other) => !this.clocked.has(other))) {
-      await this.#addHead(this.clocked, name);
-      came("gait", name);
+      await attempt("gait", name, () => this.#addHead(this.clocked, name));
     }
-    if (this.controllers.phase_free === undefined) return;
-    await this.#loadPhaseFree(this.controllers.phase_free);
-    came("policy", "phase_free");
+    const { phase_free: controller } = this.controllers;
+    if (controller !== undefined) await attempt("policy", "phase_free", () => this.#loadPhaseFree(controller, missing));
   }
 
-  async #loadPhaseFree(controller) {
+  async #loadPhaseFree(controller, missing) {
     const { student: policy, estimator } = controller.policy;
     let student = this.clocked;
     if (policy.shared.file !== student.policy.shared.file) {
       student = new Student(policy, await this.#buffer(policy.shared.file));
-      for (const name of Object.keys(policy.heads)) await this.#addHead(student, name);
+      for (const name of Object.keys(policy.heads)) {
+        await this.#addHead(student, name).catch(({ message }) => missing("policy", `phase_free in ${name}`, message));
+      }
     }
     controller.load(student, new PhaseEstimator(estimator, await this.#buffer(estimator.weights.file)));
+  }
+
+  /** @throws what happened to the first network, if none comes. */
+  async #addFirst(student, tasks) {
+    const failures = [];
+    for (const name of tasks) {
+      try {
+        return await this.#addHead(student, name);
+      } catch (error) {
+        failures.push(error);
+      }
+    }
+    throw failures[0];
   }
 
   async #simulation(mujoco, texts) {
@@ -70,7 +89,9 @@ export class Loading {
   }
 
   async #get(file) {
-    const response = await fetch(new URL(file, this.base));
+    const response = await fetch(new URL(file, this.base)).catch(({ message }) => {
+      throw new Error(`${file}: ${message}`); // which says nothing of the file
+    });
     if (!response.ok) throw new Error(`${file}: ${response.status} ${response.statusText}`);
     return response;
   }

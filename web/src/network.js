@@ -1,8 +1,8 @@
 /** Networks as products of typed arrays; weights are those of `trainers.policies`, in float32. */
 
 /** Tensors of a file by their names. */
-function tensors({ tensors: shapes, bytes }, buffer) {
-  if (buffer.byteLength !== bytes) throw new Error(`weights of ${bytes} bytes were expected, got ${buffer.byteLength}`);
+function tensors({ tensors: shapes, bytes, file }, buffer) {
+  if (buffer.byteLength !== bytes) throw new Error(`${file}: ${bytes} bytes were expected, got ${buffer.byteLength}`);
   const named = {};
   let offset = 0;
   for (const { name, shape } of shapes) {

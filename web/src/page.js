@@ -3,10 +3,11 @@ import { Dragging } from "./dragging.js";
 import { stance } from "./gait_clock.js";
 import { Gamepad } from "./gamepad.js";
 import { Keyboard, writeHelp } from "./keyboard.js";
+import { fail, say } from "./message.js";
 import { Pace } from "./pace.js";
 import { Playback } from "./playback.js";
 import { Plots } from "./plots.js";
-import { Readouts, say } from "./readouts.js";
+import { Readouts } from "./readouts.js";
 import { Remote } from "./remote.js";
 import { View } from "./scene.js";
 import { Stick } from "./stick.js";
@@ -16,8 +17,13 @@ const PUSH = 50, HARD_PUSH = 100; // percent of the largest push that the expert
 const element = (id) => document.getElementById(id);
 
 export class Page {
-  /** @param worker that holds the robot. */
-  constructor(worker) {
+  /**
+   * @param worker that holds the robot.
+   * @param started called when the robot is there.
+   * @throws a sentence for the visitor if this browser cannot show it.
+   */
+  constructor(worker, started) {
+    this.started = started;
     const calm = matchMedia("(prefers-reduced-motion: reduce)").matches;
     this.remote = new Remote(worker, say, calm);
     this.view = new View(element("view"), calm);
@@ -28,7 +34,6 @@ export class Page {
     this.dragging = new Dragging(this.view, element("view"), () => this.remote.move("release", []));
     this.jumps = true; // whether the robot was put somewhere else since the last picture
     worker.onmessage = ({ data }) => this.#handlers[data.type](data);
-    worker.onerror = ({ message }) => say(`This page cannot run here: ${message ?? "its worker did not start"}`, true);
     this.#listen();
     this.#fit();
     this.view.draw(); // the floor; until the robot comes the machine has better things to do
@@ -41,7 +46,13 @@ export class Page {
     policy: ({ name }) => (element("policy").querySelector(`[value=${name}]`).disabled = false),
     step: (report) => this.#take(report),
     tour: (message) => this.remote.share(message),
-    error: ({ message }) => say(message, true),
+    noTour: ({ message }) => this.remote.refused(message),
+    refused: ({ message }) => say(message, true),
+    missing: ({ kind, name, message }) => {
+      this.remote.lacks(name.replace("phase_free", "the student without a clock"), message);
+      if (kind === "gait") this.readouts.lacks(name);
+    },
+    failed: ({ message }) => fail(`The robot could not be loaded (${message}). Check the connection and load the page again; if that does not help, try another browser.`),
   };
 
   /** What keys, buttons and a gamepad do. */
@@ -89,17 +100,19 @@ export class Page {
     element("compare").options[1].disabled = false;
     this.lastMs = performance.now();
     requestAnimationFrame((nowMs) => this.#draw(nowMs));
+    this.started();
   }
 
   #take(report) {
     const before = this.remote.latest, anew = before === null || report.step <= before.step;
     this.remote.take(report);
     if (anew) this.plots.clear();
-    if (anew || (before.fallen && !report.fallen)) {
+    const stoodUp = anew || report.stands !== before.stands; // at the origin
+    if (stoodUp) {
       this.playback.clear();
-      this.jumps = true; // it stands at the origin again
+      this.jumps = true;
     }
-    this.playback.add(report.frames);
+    this.playback.add(stoodUp ? report.frames.slice(-1) : report.frames); // the others are of where it lay
     if (this.pace.paused) this.playback.catchUp();
     const { contacts, command, velocity } = report;
     this.plots.add({ contacts, planned: this.#planned(report), command, velocity });

@@ -1,4 +1,5 @@
 /** What the page says of the robot in words and figures. */
+import { put } from "./message.js";
 
 const RATE_EVERY_MS = 500;
 const MEAN_S = 0.25; // time constant of velocities that are read
@@ -20,6 +21,12 @@ export class Readouts {
   /** A gait's network has come. */
   enable(task) {
     this.buttons[task].disabled = false;
+  }
+
+  /** A gait's network will not come. */
+  lacks(task) {
+    this.buttons[task].classList.add("missing");
+    this.buttons[task].title += ": could not be loaded";
   }
 
   /** Whether a gait can be asked for: its network has come. */
@@ -65,12 +72,6 @@ export class Readouts {
   }
 }
 
-/** Tell the visitor something; an empty sentence takes the last one away. */
-export function say(text, isError = false) {
-  put(element("message"), text);
-  element("message").classList.toggle("error", isError);
-}
-
 function gaitButton(name, index, choose) {
   const button = document.createElement("button"), number = document.createElement("small");
   number.textContent = index + 1;
@@ -82,9 +83,4 @@ function gaitButton(name, index, choose) {
 
 function fill(row, values) {
   document.querySelectorAll(`${row} td`).forEach((cell, i) => put(cell, values[i].toFixed(2).replace("-0.00", "0.00").replace("-", "−")));
-}
-
-/** Text that is the same is left alone: what reads the page aloud would begin anew. */
-function put(element, text) {
-  if (element.textContent !== text) element.textContent = text;
 }

@@ -1,8 +1,10 @@
 /** The robot in the worker, as the page drives it: what a visitor does, what drives while nobody does, and links. */
-import { decode, encode, isOf } from "./tour_code.js";
+import { encode, isOf } from "./tour_code.js";
+import { SEEDS } from "./tour_limits.js";
 
 const PARAMETER = "tour"; // in the part of the address after #
-const SEEDS = 65536;
+const LONGEST = 1e6; // letters that every browser takes in an address; ten minutes of dragging have a third of them
+const LONG = 2000; // letters from which on other programs may cut an address
 
 export class Remote {
   /**
@@ -14,20 +16,34 @@ export class Remote {
     Object.assign(this, { worker, say, calm });
     this.latest = null; // what the worker said last of the robot
     this.tasks = [];
-    this.shared = this.#sharedTour();
-    this.demonstrates = this.shared === null && !calm;
+    this.missing = []; // what could not be loaded
+    const code = new URLSearchParams(location.hash.slice(1)).get(PARAMETER);
+    this.demonstrates = code === null && !calm;
     this.sent = [0, 0, 0];
-    worker.postMessage({ type: "start", begin: this.#beginning() });
+    const alone = calm ? { seed: randomSeed(), task: 0 } : { demo: true };
+    worker.postMessage({ type: "start", begin: code === null ? alone : { code }, instead: alone });
     window.addEventListener("hashchange", () => location.reload()); // another tour was pasted into the address
   }
 
+  /** The link holds no tour that can be driven. */
+  refused(why) {
+    this.demonstrates = !this.calm;
+    this.say(`${why[0].toUpperCase()}${why.slice(1)}; ${this.calm ? "the robot stands" : "here is the demonstration"} instead.`, true);
+  }
+
+  /** A network could not be loaded; the others are there. */
+  lacks(name, why) {
+    this.missing.push(name);
+    this.say(`Without ${this.missing.join(", ")}: not everything could be loaded (${why}). The rest works; load the page again to try once more.`, true);
+  }
+
   /** The worker is ready; tell the visitor what he sees. */
-  begun({ constants, weights }, wasTold) {
+  begun({ constants, weights, drivenWith }, wasTold) {
     Object.assign(this, { constants, weights, tasks: Object.keys(constants.tasks) });
     if (wasTold) return;
     if (this.demonstrates) this.say("Demonstration. Touch a stick, a key or a gait to take over.");
-    else if (this.shared === null) this.say("Your device asks for little motion, so nothing moves until you drive: H has the keys.");
-    else if (isOf(this.shared, weights)) this.say("A tour from a link: touch anything to take over.");
+    else if (drivenWith === null) this.say("Your device asks for little motion, so nothing moves until you drive: H has the keys.");
+    else if (isOf({ weights: drivenWith }, weights)) this.say("A tour from a link: touch anything to take over.");
     else this.say("This tour was driven with another network: it may go elsewhere.");
   }
 
@@ -80,41 +96,37 @@ export class Remote {
 
   /** Put the link to a tour into the address and the clipboard. */
   async share({ tour, full }) {
-    history.replaceState(null, "", `#${PARAMETER}=${encode({ ...tour, weights: this.weights })}`);
     const seconds = (tour.events.at(-1)[0] / this.constants.control_hz).toFixed(0);
-    const what = `link that drives these ${seconds} s again${full ? " (its first ten minutes)" : ""}`;
+    try {
+      this.#putIntoAddress(encode({ ...tour, weights: this.weights }));
+    } catch ({ message }) {
+      this.say(`There is no link to these ${seconds} s: ${message}. R begins a shorter tour.`, true);
+      return;
+    }
+    const { length } = location.href, short = full ? ` (the first ${seconds} s, what came later is not in it)` : "";
+    const warning = length > LONG ? ` It has ${length} letters: mail and messengers may cut it off.` : "";
+    const what = `link that drives ${full ? "this tour" : `these ${seconds} s`} again${short}.${warning}`;
     try {
       await navigator.clipboard.writeText(location.href);
-      this.say(`Copied: a ${what}.`);
+      this.say(`Copied: a ${what}`);
     } catch {
-      this.say(`The address is now a ${what}.`);
+      this.say(`The address is now a ${what}`);
     }
+  }
+
+  /** @throws a reason, if the browser or a limit does not let it. */
+  #putIntoAddress(code) {
+    if (code.length > LONGEST) throw new Error(`it would have ${code.length} letters, an address holds ${LONGEST}`);
+    history.replaceState(null, "", `#${PARAMETER}=${code}`);
   }
 
   get #task() {
     return Math.max(this.tasks.indexOf(this.latest?.requested), 0);
   }
 
-  /** How the robot begins when the page has been loaded. */
-  #beginning() {
-    if (this.shared !== null) return this.shared;
-    return this.demonstrates ? { demo: true } : { seed: randomSeed(), task: 0 };
-  }
-
   #begin(how) {
     this.sent = [0, 0, 0]; // a stick that is held is sent again
     this.worker.postMessage({ type: "begin", ...how });
-  }
-
-  /** The tour in the page's address, or null. */
-  #sharedTour() {
-    const text = new URLSearchParams(location.hash.slice(1)).get(PARAMETER);
-    try {
-      return text === null ? null : decode(text);
-    } catch (error) {
-      this.say(`${error.message}; ${this.calm ? "it stands" : "here is the demonstration"} instead.`, true);
-      return null;
-    }
   }
 }
 

@@ -16,7 +16,7 @@ export class View {
    * @param calm whether the visitor asked for little motion.
    */
   constructor(canvas, calm) {
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
+    this.renderer = makeRenderer(canvas);
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
     this.scene = new Scene();
@@ -118,6 +118,16 @@ export class View {
     this.floor = new Mesh(new PlaneGeometry(FLOOR_M, FLOOR_M), new MeshStandardMaterial({ map: texture, roughness: 0.95 }));
     this.floor.receiveShadow = true;
     this.scene.add(this.floor);
+  }
+}
+
+/** What draws on a canvas. @throws a sentence for the visitor if nothing can. */
+function makeRenderer(canvas) {
+  try {
+    return new WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
+  } catch (error) {
+    const what = "This page draws with WebGL 2, which this browser does not have or has switched off.";
+    throw new Error(`${what} Switch on hardware acceleration in its settings, or try another browser.`, { cause: error });
   }
 }
 

@@ -1,12 +1,13 @@
 /** A robot in a visitor's hands: his moves, what is done by itself after a fall, and a tour that can be driven again. */
 import { largestPush, moveStick, pressButton, push } from "./operator.js";
+import { checkTour, LONGEST_TOUR_S } from "./tour_limits.js";
 
 export const FALL_PAUSE_S = 1.5;
 /** A fallen robot lies for this long before it stands up anew [s]. */
-const LONGEST_TOUR_S = 600;
-/** Moves are written down for this long [s]. */
 const PULL = { stiffness: 120, damping: 10, limit: 60 };
 /** Of the string that the robot is dragged by [N/m, N s/m, N]. */
+const LASTING = ["stick", "pull"];
+/** Moves of which the last one before a control period is all that matters. */
 
 /** Numbers in [0, 1) that follow from a seed (mulberry32, by T. Ettinger, public domain). */
 function generator(seed) {
@@ -29,6 +30,8 @@ export class Session {
     this.controllers = controllers;
     this.names = Object.keys(controllers);
     this.tasks = Object.keys(robot.constants.tasks);
+    this.complete = false; // whether all networks are there that will ever be
+    this.stands = 0; // how often the robot was stood up
     this.begin({ seed: 0, task: 0, policy: 0 });
   }
 
@@ -37,10 +40,10 @@ export class Session {
    *
    * @param how `seed` of the joints' positions, indices of `task` and `policy`, and `events` of a tour to drive again;
    *   `punctual` says what happens while the network that they need is on its way: time stands still, or they are late.
-   * @throws if the tour asks for a gait or a policy that there is not.
+   * @throws if the tour asks for a gait or a policy that there is not, or for what no hands do.
    */
   begin({ seed, task, policy = 0, events = [], punctual = true }) {
-    this.#check([[0, "button", [task]], [0, "policy", [policy]], ...events]);
+    checkTour({ seed, task, policy, events }, this.tasks, this.names, this.robot.constants.control_hz);
     this.random = generator(seed);
     this.start = { seed, task };
     this.events = [];
@@ -51,16 +54,20 @@ export class Session {
     this.pulled = null;
     this.fallenFor = 0;
     this.falls = 0;
-    this.full = false;
     this.policy = 0;
     this.robot.setController(this.controllers[this.names[0]], false);
     this.#stand(this.tasks[task]);
-    if (policy !== 0) this.do("policy", [policy]);
+    if (policy !== 0 && this.#canDo("policy", [policy])) this.do("policy", [policy]);
   }
 
   /** What has been done since the beginning, as `tour_code.encode` takes it, but for the network's name. */
   get tour() {
-    return { ...this.start, events: [...this.events, [this.step, "end", []]] };
+    return { ...this.start, events: [...this.events, [Math.min(this.step, this.#longest), "end", []]] };
+  }
+
+  /** Whether the tour is longer than what is written down of it. */
+  get full() {
+    return this.step > this.#longest;
   }
 
   get replaying() {
@@ -72,18 +79,24 @@ export class Session {
     return this.controllers[this.names[this.policy]].isReady(taskName);
   }
 
-  /** A visitor's own move; it ends a tour that is being driven again. */
+  /**
+   * A visitor's own move; it ends a tour that is being driven again.
+   *
+   * @returns whether it could be made: not if the network that it needs is missing.
+   */
   move(kind, values) {
+    if (this.replaying) this.#letGo();
     this.replayed = [];
+    if (!this.#canDo(kind, values)) return false;
     this.do(kind, values);
+    return true;
   }
 
   /** Do something and write it down. */
   do(kind, values) {
-    if (kind === "stick" && values.every((value, i) => value === this.stick[i])) return;
-    if (kind === "end") return;
-    if (this.step * this.#controlS < LONGEST_TOUR_S) this.events.push([this.step, kind, values]);
-    else this.full = true;
+    if (kind === "end") this.#letGo();
+    if (kind === "end" || this.#isDone(kind, values)) return;
+    this.#write(kind, values);
     if (kind === "stick") this.stick = values;
     if (kind === "button") pressButton(this.robot, this.tasks[values[0]]);
     if (kind === "pull") this.pulled = { point: meters(values.slice(0, 3)), target: meters(values.slice(3)) };
@@ -114,13 +127,33 @@ export class Session {
     return true;
   }
 
-  #check(events) {
-    for (const [, kind, [index]] of events) {
-      const known = { button: this.tasks, policy: this.names }[kind];
-      if (known !== undefined && known[index] === undefined) {
-        throw new Error(`the tour asks for number ${index} of ${known.join(", ")}, counted from 0`);
-      }
+  /** Hands that drove again leave the stick and the robot: nobody else knows that they held them. */
+  #letGo() {
+    this.do("stick", [0, 0, 0]);
+    this.do("release", []);
+  }
+
+  /** Whether a move would change nothing. */
+  #isDone(kind, values) {
+    const isThere = (held) => values.every((value, i) => value === held[i]);
+    if (kind === "stick") return isThere(this.stick);
+    if (kind === "pull") return this.pulled !== null && isThere([...this.pulled.point, ...this.pulled.target].map(millimeters));
+    return kind === "release" && this.pulled === null;
+  }
+
+  /** Write a move down, as long as there is room for it. */
+  #write(kind, values) {
+    if (this.step >= this.#longest) return;
+    const { events, step } = this, isLasting = ([at, other]) => at === step && LASTING.includes(other);
+    for (let i = events.length - 1; LASTING.includes(kind) && i >= 0 && isLasting(events[i]); i--) {
+      if (events[i][1] === kind) events.splice(i, 1); // as often as pictures are drawn it may have been sent
     }
+    events.push([step, kind, values]);
+  }
+
+  /** Control periods of the longest tour. */
+  get #longest() {
+    return LONGEST_TOUR_S * this.robot.constants.control_hz;
   }
 
   get #controlS() {
@@ -130,12 +163,13 @@ export class Session {
   #replay() {
     while (this.replaying && this.replayed[0][0] <= this.step) {
       const [, kind, values] = this.replayed[0];
-      if (!this.#canDo(kind, values)) {
+      const canDo = this.#canDo(kind, values);
+      if (!canDo && !this.complete) {
         if (!this.punctual) this.replayed = this.replayed.map(([step, ...move]) => [step + 1, ...move]);
         return !this.punctual;
       }
       this.replayed = this.replayed.slice(1);
-      this.do(kind, values);
+      if (canDo) this.do(kind, values); // or without it, rather than never go on
     }
     return true;
   }
@@ -143,16 +177,18 @@ export class Session {
   /** Whether the network that a move needs is there. */
   #canDo(kind, [index]) {
     if (kind === "button") return this.isReady(this.tasks[index]);
-    if (kind === "policy") return this.controllers[this.names[index]].isReady(this.robot.episode.task.gait.name);
-    return true;
+    if (kind !== "policy") return true;
+    const { task, requestedTask } = this.robot.episode, controller = this.controllers[this.names[index]];
+    return [task, requestedTask].every(({ gait }) => controller.isReady(gait.name));
   }
 
-  /** After a fall stand up in the gait that was asked for last. */
+  /** After a fall stand up in the gait that was asked for last; at once if the physics has diverged: there is nothing to see. */
   #watch() {
-    if (this.fallenFor === 0 && !this.robot.simulation.fallen) return;
+    const { stable, fallen } = this.robot.simulation;
+    if (this.fallenFor === 0 && !fallen) return;
     this.falls += this.fallenFor === 0;
     this.fallenFor += this.#controlS;
-    if (this.fallenFor >= FALL_PAUSE_S) this.#stand(this.robot.episode.requestedTask.gait.name);
+    if (!stable || this.fallenFor >= FALL_PAUSE_S) this.#stand(this.robot.episode.requestedTask.gait.name);
   }
 
   #stand(taskName) {
@@ -160,6 +196,7 @@ export class Session {
     const q = this.robot.constants.robot.home_pose.map((value) => value + noise * (2 * this.random() - 1));
     this.fallenFor = 0;
     this.pulled = null;
+    this.stands += 1;
     this.robot.simulation.release();
     this.robot.reset(taskName, [0, 0, 0], q);
   }
@@ -190,4 +227,5 @@ export class Session {
   }
 }
 
+const millimeters = (value) => Math.round(1000 * value);
 const meters = (millimeters) => millimeters.map((value) => value / 1000);

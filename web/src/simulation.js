@@ -1,5 +1,7 @@
 /** The robot in MuJoCo's WebAssembly build: `go1_mtl_gym.sim.simulation`. */
 
+const LARGEST = 1e10; // mjMAXVAL, of values that MuJoCo does not call bad
+
 /** Start of a sensor's readings, a joint's position, and the like, by name. */
 function indices(mj, model, robot) {
   const id = (kind, name) => mj.mj_name2id(model, kind.value, name);
@@ -146,10 +148,16 @@ export class Simulation {
     return [cos * vx + sin * vy, cos * vy - sin * vx, up[0] * wx + up[1] * wy + up[2] * wz];
   }
 
+  /** False once the physics has diverged: MuJoCo calls a position, velocity or acceleration bad that is no number or huge. */
+  get stable() {
+    const { qpos, qvel, qacc } = this.data;
+    return [qpos, qvel, qacc].every((values) => values.every((value) => Math.abs(value) <= LARGEST));
+  }
+
   /** Whether the robot lies, or the physics has diverged. */
   get fallen() {
     const { fallen_height: height, fallen_cosine: cosine } = this.constants.episode;
     const z = this.data.qpos[2], up = this.rotation[2][2];
-    return !(z >= height && up >= cosine);
+    return !(this.stable && z >= height && up >= cosine);
   }
 }

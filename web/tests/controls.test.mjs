@@ -35,12 +35,17 @@ test("a stick comes back when everything is let go, and ends where it ends", () 
   assert.deepEqual(stick.percent, [0, 0, 0]);
 });
 
+/** Make the browser's gamepads these. */
+function browserHas(getGamepads) {
+  Object.defineProperty(globalThis, "navigator", { value: { getGamepads }, configurable: true });
+}
+
 test("a gamepad leans the stick, and a button that stays down acts once", () => {
   const done = [], stick = new Stick();
   const actions = { push: (hard) => done.push(["push", hard]), chooseNext: (places) => done.push(["next", places]) };
   const buttons = Array.from({ length: 16 }, () => ({ pressed: false }));
-  const plugged = [{ connected: true, axes: [0.56, -1, 0.1, 0], buttons }];
-  Object.defineProperty(globalThis, "navigator", { value: { getGamepads: () => plugged }, configurable: true });
+  const plugged = [{ connected: true, mapping: "standard", axes: [0.56, -1, 0.1, 0], buttons }];
+  browserHas(() => plugged);
   const gamepad = new Gamepad(stick, actions);
   buttons[0].pressed = buttons[4].pressed = true;
   gamepad.poll();
@@ -51,6 +56,30 @@ test("a gamepad leans the stick, and a button that stays down acts once", () => 
   gamepad.poll();
   assert.deepEqual(stick.percent, [0, 0, 0]);
   assert.ok(Math.abs(rested(-0.56) + 0.5) < 1e-12);
+});
+
+test("a wheel whose axes nobody knows drives nothing, and stands in no gamepad's way", () => {
+  const buttons = Array.from({ length: 12 }, () => ({ pressed: true })), done = [], stick = new Stick();
+  const wheel = { connected: true, mapping: "", axes: [0, 0, -1, 0, 0, -1], buttons }, plugged = [null, wheel];
+  browserHas(() => plugged);
+  const gamepad = new Gamepad(stick, { pause: () => done.push("pause") });
+  gamepad.poll();
+  assert.deepEqual([stick.percent, done], [[0, 0, 0], []]);
+  plugged.push({ connected: true, mapping: "standard", axes: [0.1, -1, -0.1, 0], buttons: [] });
+  gamepad.poll();
+  assert.deepEqual(stick.percent, [100, 0, 0]);
+});
+
+test("a browser that allows no gamepads is asked once", () => {
+  let asked = 0;
+  browserHas(() => {
+    asked += 1;
+    throw new Error("blocked by permissions policy");
+  });
+  const stick = new Stick(), gamepad = new Gamepad(stick, {});
+  gamepad.poll();
+  gamepad.poll();
+  assert.deepEqual([stick.percent, asked], [[0, 0, 0], 1]);
 });
 
 test("time is slowed down to a tenth, and sped up to real time", () => {

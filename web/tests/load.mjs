@@ -25,8 +25,11 @@ export function readReference(name) {
   return readJson(join(reference, name));
 }
 
+/** Where a file of the page's data lies. */
+export const dataFile = (file) => join(data, file);
+
 function buffer(file) {
-  const bytes = readFileSync(join(data, file));
+  const bytes = readFileSync(dataFile(file));
   return bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.byteLength);
 }
 

@@ -44,6 +44,7 @@ test("a picture of time that stands still is the last step's", () => {
 
 test("integers of every size come back from a link", () => {
   const events = [0, 1, -1, 63, 64, -64, -65, 8191, -100000, 123456].map((value, i) => [3 * i, "stick", [value, -value, 0]]);
+  events.push([40, "end", []]);
   const read = decode(encode({ weights: "00ab12ff", seed: 65535, task: 5, events }));
   assert.deepEqual(read, { weights: "00ab12", seed: 65535, task: 5, events: events.map(([step, kind, v]) => [step, kind, v.map((x) => x + 0)]) });
 });
