@@ -9,7 +9,8 @@ const TYPES = {
   ".html": "text/html; charset=utf-8", ".css": "text/css", ".js": "text/javascript", ".json": "application/json",
   ".wasm": "application/wasm", ".xml": "text/xml", ".svg": "image/svg+xml", ".txt": "text/plain; charset=utf-8", ".md": "text/plain",
 };
-const SITE = join(dirname(fileURLToPath(import.meta.url)), "build", "site");
+/** The built site. */
+export const SITE = join(dirname(fileURLToPath(import.meta.url)), "build", "site");
 
 /** A server of a folder on the loopback interface; port 0 is any free one. */
 export function serve(port = 0, folder = SITE) {

@@ -52,7 +52,7 @@ export class Page {
       this.remote.lacks(name.replace("phase_free", "the student without a clock"), message);
       if (kind === "gait") this.readouts.lacks(name);
     },
-    failed: ({ message }) => fail(`The robot could not be loaded (${message}). Check the connection and load the page again; if that does not help, try another browser.`),
+    failed: ({ message }) => fail(`The robot could not be loaded (${message}). Check the connection and load the page again, or try another browser.`),
   };
 
   /** What keys, buttons and a gamepad do. */

@@ -1,17 +1,31 @@
 /** The built page in a real browser: keys, buttons, dragging, touch, links. Needs a Chromium. */
 import assert from "node:assert/strict";
-import { mkdirSync } from "node:fs";
+import { cpSync, mkdirSync, mkdtempSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
 import test, { after, before } from "node:test";
 import { fileURLToPath } from "node:url";
 import puppeteer from "puppeteer-core";
 
-import { serve } from "../../serve.mjs";
+import { serve, SITE } from "../../serve.mjs";
+import { encode } from "../../src/tour_code.js";
+import { readJson } from "../load.mjs";
 import { browserOptions, chromium } from "./chromium.mjs";
 
 const pictures = fileURLToPath(new URL("../../build/pictures/", import.meta.url));
 const skip = chromium === undefined ? "no Chromium on this machine" : false;
 const PATIENCE_MS = 1000 * Number(process.env.PATIENCE_S ?? 60); // of every wait: software draws slowly
 let server, browser, address, errors;
+const folders = [];
+
+/** A copy of the site in which these files are missing. */
+function site(...missing) {
+  const folder = mkdtempSync(join(tmpdir(), "go1-page-"));
+  folders.push(folder);
+  cpSync(SITE, folder, { recursive: true });
+  for (const file of missing) rmSync(join(folder, file));
+  return folder;
+}
 
 before(async () => {
   if (skip) return;
@@ -23,18 +37,19 @@ before(async () => {
 after(async () => {
   await browser?.close();
   server?.close();
+  for (const folder of folders) rmSync(folder, { recursive: true });
 });
 
-/** A page that was opened, with its robot in motion. */
-async function open({ path = "", viewport = { width: 740, height: 500 }, calm = false } = {}) {
+/** A page that was opened, with its robot in motion; `prepare` runs in it first. */
+async function open({ path = "", viewport = { width: 740, height: 500 }, calm = false, prepare = listen } = {}) {
   errors = [];
   const page = await browser.newPage();
   page.on("pageerror", (error) => errors.push(error.message));
   page.on("console", (message) => message.type() === "error" && errors.push(message.text()));
   await page.setViewport(viewport);
   if (calm) await page.emulateMediaFeatures([{ name: "prefers-reduced-motion", value: "reduce" }]);
-  await page.evaluateOnNewDocument(listen);
-  await page.goto(address + path, { timeout: PATIENCE_MS });
+  await page.evaluateOnNewDocument(prepare);
+  await page.goto(path.startsWith("http") ? path : address + path, { timeout: PATIENCE_MS });
   await until(page, () => document.getElementById("gait").textContent.trim() !== "");
   return page;
 }
@@ -209,9 +224,65 @@ test("a link drives the same tour", { skip }, async () => {
   assert.match(await text(other, "message"), /A tour from a link/);
   await moving(other, 0, 0.4);
   await done(other, "link");
-  const broken = await open({ path: "#tour=x!" });
-  assert.match(await text(broken, "message"), /no tour; here is the demonstration/);
-  await done(broken, "broken_link");
+});
+
+test("a link to a gait that there is not shows the demonstration", { skip }, async () => {
+  const code = encode({ weights: "000000", seed: 1, task: 99, events: [[100, "end", []]] });
+  const page = await open({ path: `#tour=${code}` });
+  assert.match(await text(page, "message"), /no tour that this page can drive: .*number 99 of trot.*; here is the demonstration/);
+  await until(page, () => Number(document.querySelectorAll(".wanted td")[0].textContent) > 0.1);
+  await done(page, "broken_link");
+});
+
+test("a page that cannot start says what is missing and what to do", { skip }, async () => {
+  const withoutWebGl = () => {
+    const { getContext } = HTMLCanvasElement.prototype;
+    HTMLCanvasElement.prototype.getContext = function (kind, ...how) {
+      return kind.startsWith("webgl") ? null : getContext.call(this, kind, ...how);
+    };
+  };
+  const brokenWorker = () => {
+    window.Worker = class extends Worker {
+      constructor() {
+        super(URL.createObjectURL(new Blob(["throw new Error('broken')"])));
+      }
+    };
+  };
+  const cases = [
+    [site(), withoutWebGl, /draws with WebGL 2.*Switch on hardware acceleration/],
+    [site(), brokenWorker, /physics has stopped \(.*broken\)\. Load the page again/],
+    [site("worker.js"), () => {}, /physics could not start: worker\.js did not come.*load the page again/],
+    [site("page.js"), () => {}, /page\.js could not be loaded.*load the page again/],
+    [site("main.js"), () => {}, /main\.js did not come.*load the page again/],
+    [site("constants.json"), () => {}, /could not be loaded \(constants\.json: 404 Not Found\).*load the page again/],
+  ];
+  for (const [folder, prepare, sentence] of cases) {
+    const host = await serve(0, folder), page = await browser.newPage();
+    await page.evaluateOnNewDocument(prepare);
+    await page.goto(`http://127.0.0.1:${host.address().port}/`, { timeout: PATIENCE_MS });
+    await until(page, () => document.getElementById("message").classList.contains("error"));
+    assert.match(await text(page, "message"), sentence);
+    await page.close();
+    host.close();
+  }
+});
+
+test("gaits whose networks are missing are named, the others can be driven", { skip }, async () => {
+  const { heads } = readJson(`${SITE}/constants.json`).policies.multi_head;
+  const host = await serve(0, site(heads.bound.file, heads.pace.file));
+  const forbidden = () => {
+    navigator.getGamepads = () => { throw new DOMException("blocked by permissions policy", "SecurityError"); };
+  };
+  const page = await open({ path: `http://127.0.0.1:${host.address().port}/`, prepare: forbidden });
+  await until(page, () => document.querySelectorAll("button.missing").length === 2);
+  assert.match(await text(page, "message"), /Without bound, pace: .*404 Not Found/);
+  await page.screenshot({ path: `${pictures}missing_gaits.png` });
+  await until(page, () => !document.getElementById("policy").options[1].disabled);
+  await choose(page, "6", "gallop");
+  assert.deepEqual(await page.$$eval("#gaits button:disabled", (buttons) => buttons.map(({ id }) => id)), ["gait-bound", "gait-pace"]);
+  host.close();
+  await page.close();
+  assert.deepEqual(errors.filter((error) => !error.includes("404")), []);
 });
 
 test("fingers drive it on a phone", { skip }, async () => {
