@@ -38,12 +38,12 @@ def run_job(
         KeyboardInterrupt: says how to go on.
     """
     folder = Path(time.strftime("runs/%Y-%m-%d_%H-%M-%S")) if out is None else out
-    with alone_in(folder):
-        job = Job(config, folder, command=command, progress=True)
-        try:
+    job = Job(config, folder, command=command, progress=True)  # refuses impossible settings before it makes the folder
+    try:
+        with alone_in(folder):
             metrics = (stages or all_stages)(job)
-        except KeyboardInterrupt:
-            raise KeyboardInterrupt(f"what is done is kept, go on with: --out {shlex.quote(str(folder))}") from None
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(f"what is done is kept, go on with: --out {shlex.quote(str(folder))}") from None
     results = results_table(metrics) + "\n"
     write_atomically(folder / "table.md", lambda file: file.write(results.encode()))
     print("\n".join(["", *([results] if table else []), summary(metrics, folder, next_steps(folder, drive))]))
