@@ -49,7 +49,7 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
 
     ## Observation space
 
-    A flat float32 ``Box``, by default of 81 numbers; `layout` names the slices, whatever the arguments.
+    A flat float32 ``Box``, by default of 149 numbers; `layout` names the slices, whatever the arguments.
 
     | num     | part           | unit            | bounds +-    | there                                          |
     |---------|----------------|-----------------|--------------|------------------------------------------------|
