@@ -11,7 +11,7 @@ from experiments import main_job
 from experiments.catalog import STUDIES, resolve, study_class
 from experiments.copying import CERTIFICATES, FILM, FILMED, POLICIES, copy_certificate, copy_run, film, is_certificate
 from experiments.plots import save_figure
-from experiments.results import Results, read_json
+from experiments.results import Results
 from experiments.tables import markdown
 from go1_mtl_gym.errors import InvalidInputError
 from trainers import Certificate
@@ -135,7 +135,7 @@ def texts(root: Path) -> dict[Path, str]:
         raise InvalidInputError(f"there is no {readme}")
     files = {folder / f"{name}.md": text for name in PAGES if (text := page(name, folder)) is not None}
     for path in folder.glob(CERTIFICATES):
-        certificate = Certificate.from_dict(read_json(path))
+        certificate = Certificate.read(path)
         files[path.with_suffix(".md")] = certificate.markdown()
     path = folder / f"{main_job.NAME}.json"
     if path.is_file():

@@ -1,6 +1,5 @@
 """The main job on the command line, from its options to its last sentence."""
 
-import json
 import shlex
 import time
 from collections.abc import Callable, Mapping
@@ -10,6 +9,7 @@ from typing import Any
 from go1_mtl_gym.rendering import RenderingError
 from trainers.pipeline.config import JobConfig
 from trainers.pipeline.job import Job
+from trainers.pipeline.run_folder import read_json
 from trainers.pipeline.summary import summary
 from trainers.utils.cli import interpreter
 from trainers.utils.files import write_atomically
@@ -55,7 +55,7 @@ def all_stages(job: Job) -> dict[str, Any]:
         return job.run()
     except RenderingError as error:
         print(f"no videos: {error}")
-    return json.loads(job.folder.metrics.read_text(encoding="utf-8"))
+    return read_json(job.folder.metrics)
 
 
 def next_steps(folder: Path, drive: str) -> Mapping[str, str]:
