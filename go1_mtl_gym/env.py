@@ -82,8 +82,8 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
     after `episode_s`.
 
     ``info``: task, command, filtered_command, base_velocity (vx, vy, yaw rate in the heading frame), contacts, phase,
-    standing, reward_terms, fallen, ended ("", "fall", "unstable" or "time"). Keys, types and shapes are the same at reset,
-    where all reward terms are 0, as at step; so recorders and vector environments can stack them.
+    standing, reward_terms, fallen, ended ("", "fall", "unstable" or "time"). Keys, types and shapes are the same at
+    reset, where all reward terms are 0, as at step; so recorders and vector environments can stack them.
 
     ## Arguments
 

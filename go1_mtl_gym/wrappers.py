@@ -67,7 +67,7 @@ class PerturbationWrapper(SeededWrapper):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """Reset the environment; a seed also seeds the disturbances. ``info["executed_action"]`` is 0 still: a stand."""
+        """Reset the environment; a seed also seeds the disturbances. ``info["executed_action"]`` is 0 yet."""
         observation, info = super().reset(seed=seed, options=options)
         self._sigma = self._rng.uniform(0.0, self._noise_rad) / self._go1.action_map.half_range
         self._noise = self._sigma * self._rng.standard_normal(12)

@@ -17,6 +17,7 @@ from docs._ext.tables import TABLES, described, markdown
 from experiments.catalog import STUDIES
 from experts import MPCConfig
 from go1_mtl_gym import EnvConfig, PhysicsParams, episode, gaits
+from go1_mtl_gym.rendering import why_no_pictures
 from trainers.cli.program import COMMANDS as CLI_COMMANDS
 from trainers.evaluation import scoring
 
@@ -47,8 +48,8 @@ def skip_without(*names: str) -> None:
     """Skip where something of a line "# needs one, two and three" is not there."""
     for name in set(names) - {"and"}:
         if name == "OpenGL":
-            if no_pictures():
-                pytest.skip(no_pictures())
+            if why_no_pictures():
+                pytest.skip(why_no_pictures())
         else:
             pytest.importorskip(name)
 
