@@ -21,6 +21,7 @@ from go1_mtl_gym.expert import Expert, make_expert
 from go1_mtl_gym.gaits import check_phase
 from go1_mtl_gym.privileged import privileged_state
 from go1_mtl_gym.registration import register_task
+from go1_mtl_gym.rewards import no_reward
 from go1_mtl_gym.sensing.sensor_faults import Reading
 from go1_mtl_gym.sensing.state import RobotState
 from go1_mtl_gym.sensors import frame, measure, robot_state
@@ -81,7 +82,8 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
     after `episode_s`.
 
     ``info``: task, command, filtered_command, base_velocity (vx, vy, yaw rate in the heading frame), contacts, phase,
-    standing, reward_terms, fallen, ended ("", "fall", "unstable" or "time").
+    standing, reward_terms, fallen, ended ("", "fall", "unstable" or "time"). Keys, types and shapes are the same at
+    reset, where all reward terms are 0, as at step; so recorders and vector environments can stack them.
 
     ## Arguments
 
@@ -161,7 +163,7 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
             self._expert.reset(self.estimated_state)
         if self.render_mode == "human":
             self.render()
-        return observation, self._episode.info(state, {}, "")
+        return observation, self._episode.info(state, no_reward(), "")
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Hold one action for a control period.

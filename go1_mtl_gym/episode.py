@@ -13,7 +13,7 @@ from go1_mtl_gym.actuation import PHYSICS_HZ
 from go1_mtl_gym.env_config import EnvConfig
 from go1_mtl_gym.gait_change import GaitChange
 from go1_mtl_gym.gaits import next_phase
-from go1_mtl_gym.rewards import reward_terms
+from go1_mtl_gym.rewards import no_reward, reward_terms
 from go1_mtl_gym.sensing.observation import SensorNoise
 from go1_mtl_gym.sensing.sensor_faults import SensorFaults
 from go1_mtl_gym.sensing.state import RobotState
@@ -184,9 +184,10 @@ class Episode:
             torque: of the joints [N m], shape (12,).
             ended: why the episode is over; after "unstable" nothing measured means anything and all terms are 0.
         """
+        if ended == "unstable":
+            return no_reward()
         weights, height = self.task.reward, float(state.position_w[2])
-        terms = reward_terms(weights, self.filtered_command, state.base_velocity, state.gravity_b, height, torque)
-        return dict.fromkeys(terms, 0.0) if ended == "unstable" else terms
+        return reward_terms(weights, self.filtered_command, state.base_velocity, state.gravity_b, height, torque)
 
     def info(self, state: RobotState, terms: dict[str, float], ended: str) -> dict[str, Any]:
         """What `reset` and `step` report; nothing in it is shared with the episode.

@@ -1,6 +1,6 @@
 """Reward terms: pure functions of one control step, itemised in ``info["reward_terms"]``."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -51,3 +51,8 @@ def reward_terms(
         "effort": -weights.effort * float(np.mean((torque / robot.TORQUE_LIMIT) ** 2)),
         "alive": weights.alive,
     }
+
+
+def no_reward() -> dict[str, float]:
+    """The terms where nothing was earned: at a reset, and when the physics has diverged."""
+    return dict.fromkeys((weight.name for weight in fields(RewardWeights)), 0.0)

@@ -67,15 +67,15 @@ class PerturbationWrapper(SeededWrapper):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """Reset the environment; a seed also seeds the disturbances."""
-        result = super().reset(seed=seed, options=options)
+        """Reset the environment; a seed also seeds the disturbances. ``info["executed_action"]`` is 0 yet."""
+        observation, info = super().reset(seed=seed, options=options)
         self._sigma = self._rng.uniform(0.0, self._noise_rad) / self._go1.action_map.half_range
         self._noise = self._sigma * self._rng.standard_normal(12)
         self._next_push = self._rng.exponential(self._push_interval)
         self._next_command = self._draw_time(self._command_interval)
         self._next_task = self._draw_time(self._task_interval)
         self._time = 0.0
-        return result
+        return observation, info | {"executed_action": np.zeros(12, dtype=np.float32)}
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Disturb, then step; ``info["executed_action"]`` is the action with its noise.

@@ -17,6 +17,7 @@ from docs._ext.tables import TABLES, described, markdown
 from experiments.catalog import STUDIES
 from experts import MPCConfig
 from go1_mtl_gym import EnvConfig, PhysicsParams, episode, gaits
+from go1_mtl_gym.rendering import why_no_pictures
 from trainers.cli.program import COMMANDS as CLI_COMMANDS
 from trainers.evaluation import scoring
 
@@ -43,9 +44,22 @@ SNIPPETS = [
 COMMANDS = [*"\n".join(blocks("bash")).splitlines(), *re.findall("`([^`\n]+)`", "\n".join(PAGES.values()))]
 
 
+def skip_without(*names: str) -> None:
+    """Skip where something of a line "# needs one, two and three" is not there."""
+    for name in set(names) - {"and"}:
+        if name == "OpenGL":
+            if why_no_pictures():
+                pytest.skip(why_no_pictures())
+        else:
+            pytest.importorskip(name)
+
+
 @pytest.mark.parametrize("code", SNIPPETS)
 def test_python_runs(code, tmp_path, monkeypatch, capsys, passing_tasks):
     monkeypatch.chdir(tmp_path)
+    for name in ("MINARI_DATASETS_PATH", "WANDB_MODE", "WANDB_SILENT"):
+        monkeypatch.setenv(name, "")  # set back after the test
+    skip_without(*re.findall(r"\w+", "".join(re.findall(r"\A# needs (.*)", code))))
     exec(compile(code, "snippet", "exec"), {"__name__": "__main__"})
     assert capsys.readouterr().out or "print(" not in code
 

@@ -13,7 +13,7 @@ from types import ModuleType
 
 import pytest
 
-from go1_mtl_gym import BUILT_IN_TASKS
+from go1_mtl_gym import BUILT_IN_TASKS, env_id
 from trainers.utils.cli import interpreter
 
 ROOT = Path(__file__).parent.parent
@@ -102,6 +102,24 @@ def test_ppo_goes_on_from_the_policy(tmp_path, capsys):
     assert example("ppo").run(["--steps", "1", "--critic-steps", "40", "--episodes", "1", "--out", str(out)]) == 0
     assert capsys.readouterr().out.count("success in 100 % of 1 episodes before") == len(BUILT_IN_TASKS)
     assert example("quickstart").run([str(out), "--seconds", "0.2"]) == 0
+
+
+def test_rl_zoo_takes_its_settings_from_the_file(tmp_path, monkeypatch, capsys):
+    zoo = pytest.importorskip("rl_zoo3.train")
+    settings = ROOT / "examples" / "rl_zoo3_ppo.yml"
+    small = ["n_envs:1", "n_steps:32", "batch_size:32", "n_epochs:1"]
+    options = ["--algo", "ppo", "--env", "Go1Trot-v0", "--gym-packages", "go1_mtl_gym", "--conf-file", str(settings)]
+    options += ["-f", str(tmp_path), "-n", "32", "--eval-freq", "-1", "--seed", "0", "--num-threads", "1"]
+    monkeypatch.setattr(sys, "argv", ["train", *options, "--hyperparams", *small])
+    zoo.train()
+    (saved,) = tmp_path.glob("ppo/Go1Trot-v0_1/Go1Trot-v0.zip")
+    assert "log_std_init=-3.0" in capsys.readouterr().out and saved.stat().st_size > 10_000
+
+
+def test_rl_zoo_has_settings_for_every_environment():
+    yaml = pytest.importorskip("yaml")
+    settings = yaml.safe_load((ROOT / "examples" / "rl_zoo3_ppo.yml").read_text(encoding="utf-8"))
+    assert set(settings) == {env_id(task).partition(":")[2] for task in (None, *BUILT_IN_TASKS)}
 
 
 # -- Errors ------------------------------------------------------------------------------------------------------------

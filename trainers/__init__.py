@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from trainers.policies.expert_policy import ExpertPolicy
     from trainers.policies.loading import load
     from trainers.policies.multi_head import MultiHeadPolicy
+    from trainers.policies.original_obs import OriginalObs
     from trainers.policies.phase_estimator import PhaseEstimator, phase_errors
     from trainers.policies.phase_free import PhaseFreePolicy
     from trainers.policies.pretrained import load_pretrained
@@ -75,6 +76,7 @@ _HOME = {
     "MultiTaskLoss": "algorithms.losses",
     "OperatorConfig": "data.operator",
     "OperatorWrapper": "data.operator_wrapper",
+    "OriginalObs": "policies.original_obs",
     "PerturbationConfig": "data.environments",
     "PhaseConfig": "algorithms.config",
     "PhaseEstimator": "policies.phase_estimator",

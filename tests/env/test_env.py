@@ -319,3 +319,18 @@ def test_an_expert_made_for_another_environment_is_refused(attributes, words):
     for _ in range(2):
         with pytest.raises(InvalidInputError, match=words):
             env.expert_action()
+
+
+@pytest.mark.parametrize("task", ["trot", None])
+def test_info_has_the_same_keys_types_and_shapes_at_reset_and_step(task):
+    env = gymnasium.make(env_id(task))
+    infos = [env.reset(seed=0)[1], env.step(np.zeros(12, dtype=np.float32))[4], env.reset()[1]]
+    kinds = [{key: kind(value) for key, value in info.items()} for info in infos]
+    assert kinds[0] == kinds[1] == kinds[2] and set(kinds[0]) == INFO
+    assert set(infos[0]["reward_terms"].values()) == {0.0} and infos[1]["reward_terms"]["alive"] > 0
+
+
+def kind(value: object) -> object:
+    if isinstance(value, dict):
+        return {key: kind(entry) for key, entry in value.items()}
+    return (value.dtype, value.shape) if isinstance(value, np.ndarray) else type(value)

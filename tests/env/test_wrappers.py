@@ -294,3 +294,10 @@ def test_an_action_that_would_broadcast_is_refused(action):
     env.reset(seed=0)
     with pytest.raises(InvalidInputError, match="action"):
         env.step(action)
+
+
+def test_the_executed_action_is_told_from_the_reset_on():
+    env = wrapped(noise_rad=0.1)
+    began, (*_, info) = env.reset(seed=0)[1], env.step(home(env))
+    assert began.keys() == info.keys() and not began["executed_action"].any() and info["executed_action"].any()
+    assert began["executed_action"].dtype == info["executed_action"].dtype

@@ -1,5 +1,7 @@
 """TensorBoard log and figures."""
 
+import json
+
 import numpy as np
 import pytest
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
@@ -70,3 +72,51 @@ def test_public_names():
     assert set(trainers.__all__) <= set(dir(trainers))
     with pytest.raises(AttributeError, match="has no attribute 'nonsense'"):
         _ = trainers.nonsense
+
+
+def test_weights_and_biases_gets_numbers_pictures_and_settings(policy, demos, tmp_path, monkeypatch):
+    monkeypatch.setenv("WANDB_SILENT", "true")
+    datastore = pytest.importorskip("wandb.sdk.internal.datastore")
+    from wandb.proto.wandb_internal_pb2 import Record
+
+    monkeypatch.setenv("WANDB_MODE", "offline")
+    logger = make_logger(tmp_path, ("wandb",))
+    logger.record("closed_loop/success_rate/trot", 0.5)
+    logger.record("dagger/rounds", 3, exclude="tensorboard")
+    logger.dump(7)
+    log_text(logger, "configuration", {"preset": "smoke"})
+    log_figure(logger, "joint_targets", joint_target_figure(policy, demos), 7)
+    log_settings(logger, {"seed": 1}, {"result/r2": 0.9}, 9)
+    logger.close()
+    first = (tmp_path / "wandb_run_id").read_text()
+    again = make_logger(tmp_path, ("wandb",))
+    again.close()
+    assert (tmp_path / "wandb_run_id").read_text() == first, "a log that goes on is the same run"
+
+    (written, *_) = sorted(tmp_path.rglob("*.wandb"))
+    store = datastore.DataStore()
+    store.open_for_scan(str(written))
+    records = []
+    while (data := store.scan_data()) is not None:
+        records.append(Record.FromString(data))
+    history = [
+        {item.key or "/".join(item.nested_key): json.loads(item.value_json) for item in record.history.item}
+        for record in records
+        if record.HasField("history")
+    ]
+    assert any(row.get("closed_loop/success_rate/trot") == 0.5 and row["step"] == 7 for row in history)
+    assert any(row.get("result/r2") == 0.9 and row["step"] == 9 for row in history)
+    assert not any("dagger/rounds" in row for row in history)
+    assert list(tmp_path.rglob("media/images/*.png"))
+    config = {item.key: item.value_json for record in records for item in record.config.update}
+    config |= {item.key: item.value_json for record in records for item in record.run.config.update}
+    assert config["seed"] == "1" and "smoke" in config["configuration"]
+
+
+def test_weights_and_biases_are_asked_for_before_a_run_begins(tmp_path, monkeypatch):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    with pytest.raises(InvalidInputError, match="pip install"):
+        make_logger(tmp_path, ("wandb",))
+    with pytest.raises(InvalidInputError, match="pip install"):
+        trainers.Job(trainers.JobConfig.from_preset("smoke", wandb=True), tmp_path / "run")
+    assert not (tmp_path / "run").exists()

@@ -89,6 +89,7 @@ class JobConfig:
         command_interval: time between drawn commands in them [s].
         round_episodes: episodes per task after each DAgger round.
         video_s: length of the videos.
+        wandb: whether to log to Weights & Biases too, with the package of that name.
 
     Raises:
         InvalidInputError: if a setting cannot be.
@@ -136,6 +137,7 @@ class JobConfig:
     command_interval: float = _from(0, 5.0, above=True)
     round_episodes: int = _from(1, 2)
     video_s: float = _from(0, 4.0, above=True)
+    wandb: bool = False
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):

@@ -30,6 +30,7 @@ from trainers.policies.loading import load
 from trainers.policies.multi_head import MultiHeadPolicy
 from trainers.utils.files import json_ready, write_json
 from trainers.utils.logging import log_figure, log_round, log_settings, log_text, make_logger
+from trainers.utils.wandb_log import check_wandb
 
 DRAWN, OPERATOR = "drawn", "operator"
 """Where commands come from in the closed loop: the task's range, or hands."""
@@ -51,7 +52,7 @@ class Job:
 
     Attributes:
         folder: paths of the results, and the wall time of every stage.
-        logger: of the run, in TensorBoard's format.
+        logger: of the run, for TensorBoard, and for Weights & Biases if the settings ask for it.
 
     Raises:
         InvalidInputError: if a setting cannot be, or the folder cannot be written to or holds another run.
@@ -65,10 +66,12 @@ class Job:
         self.progress = progress
         torch.set_num_threads(config.threads)
         self._untrained()  # refuses impossible settings before anything is written
+        if config.wandb:
+            check_wandb()
         self.folder = RunFolder(Path(out))
         self.folder.claim(config)
         self.stages = Stages(config, progress, self.folder.seconds)
-        self.logger = make_logger(self.folder.log)
+        self.logger = make_logger(self.folder.log, ("tensorboard", "wandb") if config.wandb else ("tensorboard",))
         log_text(self.logger, "configuration", config.as_dict())
 
     def run(self) -> dict[str, Any]:

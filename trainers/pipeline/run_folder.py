@@ -13,7 +13,7 @@ from go1_mtl_gym.errors import InvalidInputError
 from trainers.pipeline.config import JobConfig
 from trainers.utils.files import write_json
 
-NOT_SETTINGS = ("n_envs", "threads")
+NOT_SETTINGS = ("n_envs", "threads", "wandb")
 """Fields of `JobConfig` that may change when an interrupted run goes on."""
 
 

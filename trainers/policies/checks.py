@@ -73,7 +73,7 @@ def check_arguments(
         raise InvalidInputError("use_sde is not supported: the exploration noise does not depend on the state")
 
 
-def check_observation(obs: np.ndarray, contract: PolicyContract | None, size: int, n_tasks: int, pooled: bool) -> None:
+def check_observation(obs: np.ndarray, contract: PolicyContract | None, size: int, n_tasks: int) -> None:
     """Refuse observations that a policy was not made for.
 
     Args:
@@ -81,7 +81,6 @@ def check_observation(obs: np.ndarray, contract: PolicyContract | None, size: in
         contract: of the policy, for the message.
         size: of an observation, D.
         n_tasks: length of the task id.
-        pooled: whether the task id does not matter.
 
     Raises:
         InvalidInputError: if an observation has another size or is not finite, or does not end in a one-hot task id.
@@ -91,9 +90,22 @@ def check_observation(obs: np.ndarray, contract: PolicyContract | None, size: in
         raise InvalidInputError(f"observations must have shape ({size},) or (n, {size}){meant}, got {obs.shape}")
     if not np.isfinite(obs).all():
         raise InvalidInputError("observation must be finite, got NaN or infinity")
-    task = obs[..., -n_tasks:].reshape(-1, n_tasks)
+    check_task_ids(obs[..., -n_tasks:].reshape(-1, n_tasks))
+
+
+def check_task_ids(task: np.ndarray) -> None:
+    """Refuse what is no task id, before a head is chosen by it; most often the observation was normalized.
+
+    Args:
+        task: the last K entries of observations, shape (n, K).
+
+    Raises:
+        InvalidInputError: says what came, and how observations stay as they are.
+    """
     one_hot = (task.sum(-1) == 1.0) & (task.max(-1) == 1.0)
-    if not pooled and not one_hot.all():
+    if not one_hot.all():
         raise InvalidInputError(
-            f"the last {n_tasks} entries of an observation must be a one-hot task id, got {task[~one_hot][0].tolist()}"
+            f"the last {task.shape[-1]} entries of an observation must be a one-hot task id, got "
+            f"{task[~one_hot][0].tolist()}; if VecNormalize changed it, give that norm_obs=False (the policies "
+            "normalize by themselves) or ask trainers.OriginalObs(policy, venv)"
         )

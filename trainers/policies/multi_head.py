@@ -23,7 +23,7 @@ from trainers.policies.checkpoint import (
     tensors_of,
     tuples,
 )
-from trainers.policies.checks import check_arguments, check_observation, check_spaces, number_of_tasks
+from trainers.policies.checks import check_arguments, check_observation, check_spaces, check_task_ids, number_of_tasks
 from trainers.policies.environment import ForEnvironment, json_arguments
 from trainers.policies.networks import MultiHeadActor, plain, seeded
 
@@ -273,7 +273,12 @@ class MultiHeadPolicy(SavedPolicy, ForEnvironment, ActorCriticPolicy):
     def forward(
         self, obs: torch.Tensor, deterministic: bool = False
     ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-        """Actions (n, 12), values (n, 1) and log probabilities (n,)."""
+        """Actions (n, 12), values (n, 1) and log probabilities (n,), as on-policy learners collect them.
+
+        Raises:
+            InvalidInputError: if an observation does not end in a one-hot task id.
+        """
+        check_task_ids(obs[:, -self.n_tasks :].cpu().numpy())
         normalized = self.normalized(obs)
         distribution = self._gaussian(self._means(normalized, obs))
         actions = distribution.get_actions(deterministic=deterministic)
@@ -325,7 +330,7 @@ class MultiHeadPolicy(SavedPolicy, ForEnvironment, ActorCriticPolicy):
         """
         if not isinstance(observation, dict):
             observation = _as_array(observation)
-            check_observation(observation, self.contract, self.observation_space.shape[0], self.n_tasks, self.pooled)
+            check_observation(observation, self.contract, self.observation_space.shape[0], self.n_tasks)
         return super().predict(observation, state, episode_start, deterministic)
 
     # -- Files ---------------------------------------------------------------------------------------------------------

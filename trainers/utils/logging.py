@@ -1,4 +1,4 @@
-"""The shared log: gradient steps, DAgger rounds, figures and the configuration, in TensorBoard's format."""
+"""The shared log of gradient steps, DAgger rounds, figures and the configuration, for TensorBoard and others."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -10,6 +10,7 @@ from imitation.util.logger import HierarchicalLogger, make_output_format
 from stable_baselines3.common.logger import Figure, HParam, KVWriter, Logger
 
 from trainers.utils.files import json_ready
+from trainers.utils.wandb_log import WeightsAndBiases
 
 if TYPE_CHECKING:
     import matplotlib.figure
@@ -64,7 +65,11 @@ def make_logger(
 
     Args:
         folder: where the files go; None logs nothing.
-        formats: any of "tensorboard", "csv", "json", "log", "stdout".
+        formats: any of "tensorboard", "wandb", "csv", "json", "log", "stdout"; "wandb" is Weights & Biases, see
+            `trainers.utils.wandb_log.WeightsAndBiases`.
+
+    Raises:
+        InvalidInputError: for "wandb" if its package is not installed.
     """
     outputs = [] if folder is None else [_output(name, str(folder)) for name in formats]
     where = None if folder is None else str(folder)
@@ -72,7 +77,8 @@ def make_logger(
 
 
 def _output(name: str, folder: str) -> KVWriter:
-    return TensorBoard(folder) if name == "tensorboard" else make_output_format(name, folder)
+    own = {"tensorboard": TensorBoard, "wandb": WeightsAndBiases}
+    return own[name](folder) if name in own else make_output_format(name, folder)
 
 
 def log_round(
