@@ -1,5 +1,7 @@
 """What ``go1-mtl-gym play`` does with its options."""
 
+import contextlib
+import socket
 import sys
 from pathlib import Path
 from typing import Any
@@ -7,7 +9,7 @@ from typing import Any
 from tqdm.auto import tqdm
 
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.rendering import has_display
+from go1_mtl_gym.rendering import RenderingError, has_display
 from go1_mtl_gym.validation import one_of
 from trainers.evaluation.agents import opened
 from trainers.evaluation.certificate import Certificate
@@ -16,7 +18,8 @@ from trainers.evaluation.replay import certified_episode
 from trainers.evaluation.script import Script
 from trainers.evaluation.tour import DEFAULT_TOUR
 from trainers.play.hands import Hands
-from trainers.play.options import PlayOptions
+from trainers.play.loop import Surface, play_on
+from trainers.play.options import LOOPBACK, PlayOptions
 from trainers.play.player import Player
 from trainers.play.record import FilmFile, Recording, record
 from trainers.play.session import EXPERT, Session
@@ -30,6 +33,8 @@ SEED = 1
 STUDENT = next(iter(PRETRAINED))
 FILM_SIZE, LARGE_FILM_SIZE = (640, 360), (1280, 720)
 """Width and height of a film without a window [pixels]: one that waits in memory until its end, and any other."""
+WEB_PACKAGES = ("viser", "trimesh")
+LOOPBACKS = (LOOPBACK, "localhost", "::1")
 
 
 def play(options: PlayOptions) -> None:
@@ -41,7 +46,7 @@ def play(options: PlayOptions) -> None:
     film = None if options.record is None else FilmFile(writable_file(options.record), options.fps)
     tape = None if options.save_script is None else writable_file(options.save_script)
     script = None if options.script is None else Script.read(options.script)
-    if film is not None and script is None and options.replay is None and not has_display():
+    if film is not None and script is None and options.replay is None and not (options.web or has_display()):
         print("no display: filming the tour of the package; --script FILE films another one", file=sys.stderr)
         script = DEFAULT_TOUR
     session, hands, title = _session(options, script)
@@ -51,7 +56,7 @@ def play(options: PlayOptions) -> None:
         if film is not None and hands is None:
             _film(player, film, options.size or (FILM_SIZE if film.waits else LARGE_FILM_SIZE))
         else:
-            _play(player, film, options.size or (1280, 720))
+            _play(player, film, options)
     if tape is not None and hands is not None and session.steps:
         hands.script.write(tape)
         print(f"{tape} has what you did: --script {tape} does it again")
@@ -95,18 +100,52 @@ def _film(player: Player, film: FilmFile, size: tuple[int, int]) -> None:
     print(film.summary)
 
 
-def _play(player: Player, film: FilmFile | None, size: tuple[int, int]) -> None:
-    from trainers.play.window import Window
-
-    window = Window(player, *size)
+def _play(player: Player, film: FilmFile | None, options: PlayOptions) -> None:
+    surface = _surface(player, options)
     try:
-        window.run(each=Recording(player, film, window.picture) if film is not None else lambda: None)
+        each = Recording(player, film, surface.picture) if film is not None else lambda: None
+        with contextlib.suppress(KeyboardInterrupt):  # how one ends a page; what was filmed and written down stays
+            play_on(surface, player, each=each)
         if film is not None:
             if film.is_still:
-                film.add(window.picture())
+                film.add(surface.picture())
             film.close()
             print(film.summary)
     finally:
         if film is not None:
             film.discard()
-        window.close()
+        surface.close()
+
+
+def _surface(player: Player, options: PlayOptions) -> Surface:
+    """A window, or a page where there is no display or a page is asked for."""
+    size = options.size or LARGE_FILM_SIZE
+    if not options.web and has_display():
+        from trainers.play.window import Window
+
+        return Window(player, *size)
+    try:
+        from trainers.play.browser.surface import Browser
+    except ModuleNotFoundError as error:
+        if error.name not in WEB_PACKAGES:
+            raise
+        why = "" if options.web else "there is no display, and "
+        raise RenderingError(
+            f"{why}a page in a browser needs {error.name}: pip install go1-mtl-gym[web], or add --record FILE.webp to film"
+            " it without either"
+        ) from error
+    browser = Browser(player, options.host, options.port, size)
+    print(_invitation(browser.link, options), flush=True)
+    return browser
+
+
+def _invitation(link: str, options: PlayOptions) -> str:
+    """How to get to a page."""
+    why = "" if options.web else "there is no display: "
+    lines = [f"{why}drive in a browser at {link} (Ctrl+C here ends it)"]
+    port = link.rpartition(":")[2]
+    if options.host in LOOPBACKS:
+        lines += [f"from another machine: ssh -N -L {port}:{options.host}:{port} {socket.gethostname()}, then the same link"]
+    else:
+        lines += ["everybody who can reach this machine there can drive"]
+    return "\n".join(lines)
