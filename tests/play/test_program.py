@@ -123,6 +123,8 @@ def test_an_episode_of_a_certificate_is_filmed(tmp_path, capsys):
         (["--script", "a.json", "--task", "trot"], "--script says everything; beside it came --task"),
         (["--script", "a.json", "--save-script", "b.json"], "beside it came --save-script"),
         (["--seed", "-1"], "seed"),
+        (["--port", "70000"], "port must be an integer from 0 to 65535"),
+        (["--web", "--script", "a.json", "--record", "b.gif"], "give --record or --web, got both"),
         (["--size", "0", "90"], "width of the picture [pixels] must be an integer from 1"),
     ],
 )
@@ -134,14 +136,25 @@ def test_what_cannot_be_done_is_one_sentence(options, message, capsys, tmp_path,
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems always have a display")
-@pytest.mark.parametrize(("display", "message"), [(None, "there is no display"), (":9999", "cannot open a window")])
-def test_without_a_display_the_sentence_says_what_to_do(display, message):
+@pytest.mark.parametrize(
+    ("display", "options", "messages"),
+    [
+        (None, [], ("there is no display", "pip install go1-mtl-gym[web]")),
+        (None, ["--web"], ("error: a page in a browser needs viser", "pip install go1-mtl-gym[web]")),
+        (":9999", [], ("cannot open a window",)),
+    ],
+)
+def test_where_nothing_can_be_shown_the_sentence_says_what_to_do(display, options, messages):
     environment = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")}
     environment |= {"PYTHONPATH": os.pathsep.join(sys.path)} | ({} if display is None else {"DISPLAY": display})
-    command = [sys.executable, "-m", "trainers", "play"]
+    code = (
+        "import sys; sys.modules['viser'] = None\n"
+        f"from trainers.cli.program import run; sys.exit(run({['play', *options]}))"
+    )
+    command = [sys.executable, "-c", code]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300)
     assert done.returncode == 2 and "Traceback" not in done.stderr
-    assert message in done.stderr and "--record FILE.webp" in done.stderr
+    assert all(message in done.stderr for message in (*messages, "--record FILE.webp"))
 
 
 def test_a_student_drives_without_what_only_training_needs():

@@ -16,7 +16,7 @@ MAX_PORT = 65535
 
 @dataclasses.dataclass(frozen=True)
 class PlayOptions:
-    """Drive a policy or the expert in a window or a browser, with held keys or a gamepad, or let a script drive; film it.
+    """Drive a policy or the expert in a window or a browser, by keys or a gamepad, or let a script drive; film it.
 
     Attributes:
         policy: File of a policy, "clocked" or "phase_free" (in the package), or "expert" (clocked if not given). As
@@ -71,7 +71,7 @@ class PlayOptions:
                 '--replay FILE and --episode NAME belong together, such as --episode "operator/trot/17"'
             )
         if self.web and self.record is not None and (self.script or self.replay) is not None:
-            raise InvalidInputError("scripts and replays are filmed without being shown: give --record or --web, got both")
+            raise InvalidInputError("what a script or a replay does is filmed unseen: give --record or --web, got both")
         driven = "--script" if self.script is not None else "--replay" if self.replay is not None else ""
         for name in ("task", "save_script", *(("seed",) if self.replay is not None else ())):
             if driven and getattr(self, name) is not None:

@@ -131,8 +131,8 @@ def _surface(player: Player, options: PlayOptions) -> Surface:
             raise
         why = "" if options.web else "there is no display, and "
         raise RenderingError(
-            f"{why}a page in a browser needs {error.name}: pip install go1-mtl-gym[web], or add --record FILE.webp to film"
-            " it without either"
+            f"{why}a page in a browser needs {error.name}: pip install go1-mtl-gym[web]; or add --record FILE.webp to"
+            " film it without either"
         ) from error
     browser = Browser(player, options.host, options.port, size)
     print(_invitation(browser.link, options), flush=True)
@@ -145,7 +145,8 @@ def _invitation(link: str, options: PlayOptions) -> str:
     lines = [f"{why}drive in a browser at {link} (Ctrl+C here ends it)"]
     port = link.rpartition(":")[2]
     if options.host in LOOPBACKS:
-        lines += [f"from another machine: ssh -N -L {port}:{options.host}:{port} {socket.gethostname()}, then the same link"]
+        tunnel = f"ssh -N -L {port}:{options.host}:{port} {socket.gethostname()}"
+        lines += [f"from another machine: {tunnel}, then the same link there"]
     else:
         lines += ["everybody who can reach this machine there can drive"]
     return "\n".join(lines)

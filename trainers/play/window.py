@@ -28,7 +28,7 @@ CAPTIONS_HZ = 15.0
 """How often numbers change; nobody reads faster, and letters take time to draw."""
 CAPACITY = 2000
 """Geoms of the scene."""
-NO_WINDOW = "add --record FILE.webp to film it without one"
+NO_WINDOW = "add --web to drive it in a browser, or --record FILE.webp to film it"
 CLICK_PIXELS = 4
 """A button of the mouse that moved less than this was not dragged."""
 

@@ -5,7 +5,7 @@ import html
 import importlib.resources
 import json
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any
 
 from trainers.play.browser.holds import Holds
@@ -32,6 +32,8 @@ HOLD_HZ = 10.0
 """How often a tab says that a button is held."""
 LIT, DARK = "blue", "gray"
 COLUMNS = 3
+EDGE = 9
+"""Between the buttons and the panel's edges [pixels]."""
 
 
 class Buttons:
@@ -44,6 +46,9 @@ class Buttons:
         holds: that they are held by.
         post: what brings that to the thread that plays.
         turn_to: is told of a tab's handle before one of its buttons acts.
+
+    Attributes:
+        keyboard: JavaScript that lets the keyboard press them.
     """
 
     def __init__(
@@ -63,7 +68,10 @@ class Buttons:
         for key, label in ACTIONS:
             if driven or key in LOOKS:
                 self._add(key, label, self._press)
-        gui.add_html(self._style() + self._keyboard())
+        self.keyboard = self._keyboard()
+        # a picture that cannot be loaded runs the script: those in HTML that comes later are not run
+        picture = f'<img alt="" style="display: none" src="data:," onerror="{html.escape(self.keyboard)}">'
+        gui.add_html(self._style() + picture)
         with gui.add_folder("Keys", expand_by_default=False):
             gui.add_html(_help())
 
@@ -76,6 +84,8 @@ class Buttons:
         }  # fmt: skip
         for key, button in self._buttons.items():
             button.color = LIT if lit.get(key) else DARK
+        self._buttons["SPACE"].label = "Go on" if player.paused else "Pause"
+        self._buttons["C"].label = f"Cam: {player.camera.mode}"
 
     def _add(self, key: str, label: str, act: Callable[[str, Any], None]) -> None:
         button = self._buttons[key] = self._gui.add_button(label, color=DARK)
@@ -105,29 +115,42 @@ class Buttons:
 
     # -- In the browser ------------------------------------------------------------------------------------------------
 
-    def _id(self, key: str) -> str:
-        """Of a button's element; viser has no public name for it."""
-        return self._buttons[key]._impl.uuid
+    @property
+    def ids(self) -> dict[str, str]:
+        """Key -> id of its button's element, for which viser has no public name."""
+        return {key: button._impl.uuid for key, button in self._buttons.items()}
 
     def _style(self) -> str:
         """Three in a row; viser gives each button a line of its own."""
-        rows = ", ".join(f'div:has(> [id="{self._id(key)}"])' for key in self._buttons if key != GENTLY[0])
-        first = ", ".join(f'div:has(> [id="{self._id(key)}"])' for key in self._breaks())
-        place = f"display: inline-block; box-sizing: border-box; width: {100 / COLUMNS:.3f}%; margin: 0; padding: 0 2px 4px"
-        return f"<style>{rows} {{ {place} }} {first} {{ padding-top: 8px }} button {{ touch-action: none }}</style>"
+        rows = ", ".join(self._box(key) for key in self._buttons if key != GENTLY[0])
+        first = ", ".join(self._box(key) for group in self._groups() for key in group[:COLUMNS])
+        width = f"calc({100 / COLUMNS:.3f}% - {2 * EDGE / COLUMNS:.3f}px)"
+        place = (
+            f"display: inline-block; box-sizing: border-box; width: {width};"
+            " margin: 0 !important; padding: 0 2px 4px !important"
+        )
+        # the edges of the panel are the margins of the outer ones
+        left = ", ".join(self._box(key) for group in self._groups() for key in group[::COLUMNS])
+        return (
+            f"<style>{rows} {{ {place} }} {left} {{ margin-left: {EDGE}px !important }}"
+            f" {first} {{ padding-top: 6px !important }} button {{ touch-action: none }}</style>"
+        )
 
-    def _breaks(self) -> Iterable[str]:
-        """The first row of each group."""
-        groups = ([*self._gaits.values()], [key for key, _ in PAD], [key for key, _ in ACTIONS])
-        return (key for group in groups for key in group[:COLUMNS] if key in self._buttons)
+    def _box(self, key: str) -> str:
+        """What selects the box around a button."""
+        return f'div:has(> [id="{self.ids[key]}"])'
+
+    def _groups(self) -> list[list[str]]:
+        """Keys of the buttons that stand together in rows."""
+        groups = (self._gaits.values(), (key for key, _ in PAD), (key for key, _ in ACTIONS))
+        return [[key for key in group if key in self._buttons] for group in groups]
 
     def _keyboard(self) -> str:
-        """An element whose picture cannot be loaded, which runs `keyboard.js`: scripts in HTML that comes later do not."""
-        held = [self._id(key) for key, _ in (*PAD, GENTLY) if key in self._buttons]
-        buttons = {_code(key): self._id(alike) for key, alike in self._aliases().items()}
+        """`keyboard.js` for these buttons."""
+        held = [self.ids[key] for key, _ in (*PAD, GENTLY) if key in self._buttons]
+        buttons = {_code(key): self.ids[alike] for key, alike in self._aliases().items()}
         script = importlib.resources.files(__package__).joinpath("keyboard.js").read_text("utf-8")
-        script = script.replace("KEYS", json.dumps({"buttons": buttons, "held": held}))
-        return f'<img alt="" style="display: none" src="data:," onerror="{html.escape(script)}">'
+        return script.replace("KEYS", json.dumps({"buttons": buttons, "held": held}))
 
     def _aliases(self) -> dict[str, str]:
         """The button that each key presses: its own, or that of another one which does the same."""
@@ -137,7 +160,7 @@ class Buttons:
                 if STICK_KEYS[alike] == end and alike in self._buttons:
                     keys[key] = alike
         if GENTLY[0] in self._buttons:
-            keys |= {key: GENTLY[0] for key in SHIFT_KEYS}
+            keys |= dict.fromkeys(SHIFT_KEYS, GENTLY[0])
         return keys
 
 

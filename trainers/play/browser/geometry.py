@@ -21,7 +21,7 @@ class Instance(NamedTuple):
 
     Attributes:
         shape: name of the mesh, as `unit_mesh` has it.
-        position_w: [m], shape (3,).
+        position_w: in the world of the scene [m], shape (3,).
         rotation: from the mesh's axes to the world's, shape (3, 3).
         scale: along the mesh's axes, shape (3,).
         rgba: color, each part in [0, 1], shape (4,).
@@ -76,8 +76,8 @@ def _instances_of(geom: mujoco.MjvGeom) -> list[Instance]:
 def unit_mesh(shape: str, model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
     """Vertices, shape (v, 3), and faces, shape (f, 3), of a mesh.
 
-    Those that are not the model's reach from -1 to 1 along every axis, but for the cone, which stands on the origin and is
-    one high.
+    Those that are not the model's reach from -1 to 1 along every axis, but for the cone, which stands on the origin and
+    is one high.
 
     Args:
         shape: "tube", "ball", "cube", "cone", or "mesh" and its number in the model.
@@ -111,18 +111,24 @@ class Mirror:
 
     Args:
         nodes: viser's `SceneApi`.
-        root: name of the node below which everything is put.
         model: for its meshes.
     """
 
-    def __init__(self, nodes: Any, root: str, model: mujoco.MjModel) -> None:
-        self._nodes, self._root, self._model = nodes, root, model
+    def __init__(self, nodes: Any, model: mujoco.MjModel) -> None:
+        self._nodes, self._model = nodes, model
         self._handles: dict[tuple[str, bool], Any] = {}
 
-    def update(self, scene: mujoco.MjvScene) -> None:
-        """Show what a scene shows now."""
+    def update(self, scene: mujoco.MjvScene, turn: np.ndarray, shift: np.ndarray) -> None:
+        """Show what a scene shows now.
+
+        Args:
+            scene: of MuJoCo.
+            turn: of the world before it is drawn, shape (3, 3).
+            shift: of the turned world [m], shape (3,).
+        """
         groups: dict[tuple[str, bool], list[Instance]] = {key: [] for key in self._handles}
         for each in instances(scene):
+            each = each._replace(position_w=turn @ each.position_w + shift, rotation=turn @ each.rotation)
             groups.setdefault((each.shape, bool(each.rgba[3] < 1.0)), []).append(each)
         for key, members in groups.items():
             self._show(key, members)
@@ -142,7 +148,7 @@ class Mirror:
         shape, clear = key
         vertices, faces = unit_mesh(shape, self._model)
         return self._nodes.add_batched_meshes_simple(
-            f"{self._root}/{shape.replace(' ', '_')}{'_clear' if clear else ''}",
+            f"/{shape.replace(' ', '_')}{'_clear' if clear else ''}",
             vertices,
             faces,
             **{f"batched_{name}": values for name, values in columns.items()},
@@ -164,5 +170,5 @@ def _columns(members: list[Instance], count: int, clear: bool) -> dict[str, np.n
         wxyzs[:used] = [quat_from_matrix(each.rotation) for each in members]
         rgba = np.clip([each.rgba for each in members], 0.0, 1.0)
         colors[:used], opacities[:used] = np.rint(255.0 * rgba[:, :3]), rgba[:, 3]
-    columns = {"positions": positions, "wxyzs": wxyzs, "scales": scales, "colors": colors}
+    columns: dict[str, np.ndarray] = {"positions": positions, "wxyzs": wxyzs, "scales": scales, "colors": colors}
     return columns | ({"opacities": opacities} if clear else {})

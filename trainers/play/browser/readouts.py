@@ -9,8 +9,18 @@ import numpy as np
 
 from go1_mtl_gym import robot
 from trainers.evaluation.captions import (
-    AXES, COMMAND, CONTACT, FULL_SCALE, MEASURED, STRIP_S, TRACK, Color, Reading, number, spells,
-)  # fmt: skip
+    AXES,
+    COMMAND,
+    CONTACT,
+    FULL_SCALE,
+    MEASURED,
+    STRIP_S,
+    TRACK,
+    Color,
+    Reading,
+    number,
+    spells,
+)
 from trainers.play.player import Player
 from trainers.play.session import EXPERT
 from trainers.play.status import EXPERT_COLOR, notice_of
@@ -54,9 +64,15 @@ class Readouts:
                 scales = {"x": {"time": False, "auto": True}, "y": {"range": (-FULL_SCALE, FULL_SCALE)}}
                 self._plots.append(
                     self._gui.add_uplot(
-                        empty, series, title=f"{name} [{unit}]", scales=scales, axes=(axis, {**axis, "size": 36}),
-                        legend={"show": False}, height=PLOT_HEIGHT, padding=(4, 8, 0, 0),
-                    )  # fmt: skip
+                        empty,
+                        series,
+                        title=f"{name} [{unit}]",
+                        scales=scales,
+                        axes=(axis, {**axis, "size": 36}),
+                        legend={"show": False},
+                        height=PLOT_HEIGHT,
+                        padding=(4, 8, 0, 0),
+                    )
                 )
 
     def update(self, notice: str | None = None) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 import viser
 
 from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.rotations import quat_from_matrix, yaw_matrix
 from trainers.play.browser.buttons import Buttons
 from trainers.play.browser.geometry import Mirror
 from trainers.play.browser.holds import Holds
@@ -25,19 +26,24 @@ from trainers.play.record import OffScreen
 from trainers.play.scene import Ghost, furnish
 
 TITLE = "go1-mtl-gym"
-ROOT = "/world"
 LARGEST_HZ = 30.0
 """Pictures per second; more would only fill the line to another machine."""
 CAPACITY = 2000
 """Geoms of the scene."""
-FLOOR = {"plane_color": (58, 66, 76), "cell_color": (84, 94, 106), "section_color": (112, 124, 138)}
+FLOOR: dict[str, Any] = {
+    "plane_color": (58, 66, 76),
+    "plane_opacity": 1.0,
+    "cell_color": (84, 94, 106),
+    "section_color": (112, 124, 138),
+    "fade_distance": 25.0,
+}
 
 
 class Browser:
     """A server on this machine, whose page is open in some tabs, or in none.
 
-    The world is moved and turned under the robot rather than every tab's camera over it: so each can be turned by hand while
-    it follows.
+    The world is moved and turned under the robot rather than every tab's camera over it: so each can be turned by hand
+    while it follows.
 
     Args:
         player: that is shown.
@@ -62,7 +68,8 @@ class Browser:
         self._player, self.controls = player, Controls(player)
         self._holds = Holds(self.controls)
         self._inbox: queue.SimpleQueue[Callable[[], object]] = queue.SimpleQueue()
-        self._film_size, self._off_screen = film_size, None
+        self._film_size = film_size
+        self._off_screen: OffScreen | None = None
         self._ghost: Ghost | None = None
         self._host = host
         self._server = _started(host, port)
@@ -86,9 +93,8 @@ class Browser:
         aim = np.array([0.0, 0.0, AIM_HEIGHT])
         server.initial_camera.look_at = tuple(aim)
         server.initial_camera.position = tuple(aim - mjv.distance * looking)
-        self._world = server.scene.add_frame(ROOT, show_axes=False)
-        server.scene.add_grid(f"{ROOT}/floor", infinite_grid=True, plane_opacity=1.0, fade_distance=25.0, **FLOOR)
-        self._mirror = Mirror(server.scene, ROOT, model)
+        self._floor = server.scene.add_grid("/floor", infinite_grid=True, **FLOOR)
+        self._mirror = Mirror(server.scene, model)
         server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False, control_width="medium")
         self._readouts = Readouts(server.gui, player)
         self._buttons = Buttons(server.gui, player, self.controls, self._holds, self._inbox.put, self._turn_to)
@@ -108,6 +114,16 @@ class Browser:
     def tabs(self) -> int:
         """How many tabs are open."""
         return len(self._server.get_clients())
+
+    @property
+    def button_ids(self) -> dict[str, str]:
+        """Key, by its name as `Controls.key` has it -> id of the button on the page that presses it."""
+        return self._buttons.ids
+
+    @property
+    def keyboard(self) -> str:
+        """JavaScript that lets the keyboard of a tab press these buttons."""
+        return self._buttons.keyboard
 
     # -- What a surface does -------------------------------------------------------------------------------------------
 
@@ -129,13 +145,13 @@ class Browser:
         if player.ghost and self._ghost is None:
             self._ghost = Ghost(player.session)
         simulation, everything = player.session.go1.simulation, mujoco.mjtCatBit.mjCAT_ALL
-        mujoco.mjv_updateScene(
-            simulation.model, simulation.data, self._option, self._perturbation, player.camera.mjv, everything, self._scene
-        )
+        camera, option, perturbation = player.camera.mjv, self._option, self._perturbation
+        mujoco.mjv_updateScene(simulation.model, simulation.data, option, perturbation, camera, everything, self._scene)
         furnish(self._scene, player.session, self._ghost if player.ghost else None)
         with self._server.atomic():
-            self._move_world()
-            self._mirror.update(self._scene)
+            turn, shift = self._place()
+            self._floor.wxyz, self._floor.position = quat_from_matrix(turn), shift
+            self._mirror.update(self._scene, turn, shift)
         self._readouts.update(notice)
         self._buttons.update()
 
@@ -162,12 +178,12 @@ class Browser:
         """How far the player's camera has turned with the robot [rad]."""
         return float(np.radians(self._player.camera.mjv.azimuth - self._azimuth))
 
-    def _move_world(self) -> None:
-        """Put the point that is followed into the middle, and what the camera follows in heading straight."""
-        cos, sin = np.cos(-self._turn), np.sin(-self._turn)
+    def _place(self) -> tuple[np.ndarray, np.ndarray]:
+        """How the world is turned, and then shifted: what is followed comes into the middle, and its heading stays."""
+        turn = np.eye(3)
+        turn[:2, :2] = yaw_matrix(-self._turn)
         x, y, _ = self._player.camera.mjv.lookat
-        self._world.wxyz = (np.cos(self._turn / 2), 0.0, 0.0, -np.sin(self._turn / 2))
-        self._world.position = (-(cos * x - sin * y), -(sin * x + cos * y), 0.0)
+        return turn, -turn @ np.array([x, y, 0.0])
 
     def _turn_to(self, tab: Any) -> None:
         """Let a tab be the one whose direction "away from you" means."""
@@ -195,14 +211,16 @@ def _started(host: str, port: int) -> Any:
 
 
 def _check_free(host: str, port: int) -> None:
-    """Listen for a moment: viser would take another port without a word, or never answer.
+    """Take it for a moment: viser would take another port without a word, or never answer.
 
     Raises:
         InvalidInputError: if that is not possible.
     """
     try:
-        family, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
-        socket.create_server(address[:2], family=family).close()
+        family, kind, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)[0]
+        with socket.socket(family, kind) as trial:
+            trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # as viser does: one that was just left is free
+            trial.bind(address)
     except OSError as error:
         raise _busy(host, port, error.strerror or str(error)) from error
 
