@@ -20,6 +20,8 @@ try {
     const handle = await page.waitForFunction(find, { timeout, polling: 100 }, label);
     return handle.asElement();
   };
+  const walks = (gait) => // the report's first word
+    page.waitForFunction((gait) => document.querySelector("b")?.textContent === gait, { timeout, polling: 100 }, gait);
   const pause = (ms) => new Promise((done) => setTimeout(done, ms));
 
   await said("student drives");
@@ -33,8 +35,9 @@ try {
   await page.keyboard.up("ArrowLeft");
 
   await page.keyboard.press("Digit2");
-  await said("bound");
+  await walks("bound");
   await (await button("5 pace")).click();
+  await walks("pace");
   await (await button("Expert")).click();
   await said("expert drives");
   await page.keyboard.press("KeyT");

@@ -175,14 +175,14 @@ def test_holds_end_by_silence_and_by_leaving(player):
     holds = Holds(Controls(player))
     stick = lambda: player.hands.stick.tolist()  # noqa: E731
     holds.hold(1, "W", 10.0)
-    holds.hold(2, "D", 10.4)
+    holds.hold(2, "D", 10.0 + SILENT_S / 2)
     holds.forget_silent(10.0 + SILENT_S)
     assert stick() == [1.0, 0.0, -1.0]
     holds.forget_silent(10.1 + SILENT_S)
     assert stick() == [0.0, 0.0, -1.0]
     holds.release(1, "D")  # not the one that holds it
     assert stick() == [0.0, 0.0, -1.0]
-    holds.hold(1, "D", 10.5)
+    holds.hold(1, "D", 11.0)
     holds.leave(2)
     assert stick() == [0.0, 0.0, -1.0]
     holds.leave(1)

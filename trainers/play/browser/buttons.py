@@ -62,7 +62,7 @@ class Buttons:
         if driven:
             for number, task in enumerate(player.session.go1.tasks, 1):
                 self._gaits[task] = str(number)
-                self._add(str(number), f"{number}  {task}", self._press)
+                self._add(str(number), f"{number} {task}", self._press)
             for key, label in (*PAD, GENTLY):
                 self._add(key, label, self._hold)
         for key, label in ACTIONS:
@@ -129,11 +129,14 @@ class Buttons:
             f"display: inline-block; box-sizing: border-box; width: {width};"
             " margin: 0 !important; padding: 0 2px 4px !important"
         )
+        each = ", ".join(f"{self._box(key)} button" for key in self._buttons)
         # the edges of the panel are the margins of the outer ones
         left = ", ".join(self._box(key) for group in self._groups() for key in group[::COLUMNS])
         return (
             f"<style>{rows} {{ {place} }} {left} {{ margin-left: {EDGE}px !important }}"
-            f" {first} {{ padding-top: 6px !important }} button {{ touch-action: none }}</style>"
+            f" {first} {{ padding-top: 6px !important }}"
+            f" {each} {{ padding: 0 2px; touch-action: none }}"
+            "</style>"
         )
 
     def _box(self, key: str) -> str:

@@ -16,6 +16,10 @@ HEAD_LENGTH, HEAD_WIDTH = 5.0, 2.2
 """Of an arrow's head, as multiples of the shaft's radius."""
 
 
+CLEAR_SHADE = 0.55
+"""How dark what one sees through is made: in viser's light its colors would else go white."""
+
+
 class Instance(NamedTuple):
     """One mesh at one place.
 
@@ -169,6 +173,7 @@ def _columns(members: list[Instance], count: int, clear: bool) -> dict[str, np.n
         scales[:used] = [each.scale for each in members]
         wxyzs[:used] = [quat_from_matrix(each.rotation) for each in members]
         rgba = np.clip([each.rgba for each in members], 0.0, 1.0)
+        rgba[:, :3] *= CLEAR_SHADE if clear else 1.0
         colors[:used], opacities[:used] = np.rint(255.0 * rgba[:, :3]), rgba[:, 3]
     columns: dict[str, np.ndarray] = {"positions": positions, "wxyzs": wxyzs, "scales": scales, "colors": colors}
     return columns | ({"opacities": opacities} if clear else {})

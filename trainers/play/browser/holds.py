@@ -2,8 +2,9 @@
 
 from trainers.play.controls import Controls
 
-SILENT_S = 0.5
-"""A hold that was not heard of for so long is over: the tab is gone, or hidden, or the line is dead [s]."""
+SILENT_S = 1.0
+"""A hold that was not heard of for so long is over: the tab is gone, or hidden, or the line is dead. Browsers that draw
+by software may be silent for half of it [s]."""
 
 
 class Holds:
