@@ -63,12 +63,12 @@ web/node_modules/.package-lock.json: web/package.json web/package-lock.json | ne
 
 .venv/.installed: $(SOURCES)
 	$(PYTHON) -m venv .venv
-	.venv/$(PIP) $(TESTED) -e .
+	.venv/$(PIP) $(TESTED) -e ".[web]"
 	touch $@
 
 .venv/.installed-test: $(SOURCES)
 	$(PYTHON) -m venv .venv
-	.venv/$(PIP) $(TESTED) -e ".[test,tools]"
+	.venv/$(PIP) $(TESTED) -e ".[test,tools,web]"
 	touch .venv/.installed $@
 
 # The site imports the packages: it is built where the tests run, so that nothing large is installed twice.
@@ -79,7 +79,7 @@ web/node_modules/.package-lock.json: web/package.json web/package-lock.json | ne
 # imitation pins older versions of both; the code runs on the newest all the same, so they go on top without its consent.
 .venv-newest/.installed-test: $(SOURCES) constraints/newest.txt
 	$(PYTHON) -m venv .venv-newest
-	.venv-newest/$(PIP) $(TESTED) -e ".[test,tools]"
+	.venv-newest/$(PIP) $(TESTED) -e ".[test,tools,web]"
 	.venv-newest/$(PIP) --no-deps -r constraints/newest.txt
 	touch $@
 

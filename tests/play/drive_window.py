@@ -10,6 +10,7 @@ import trainers
 from tests.play.conftest import Stand
 from trainers.evaluation.episodes import EpisodeSetup
 from trainers.play.hands import Hands
+from trainers.play.loop import play_on
 from trainers.play.player import Player
 from trainers.play.session import Session
 from trainers.play.window import Window
@@ -37,7 +38,7 @@ def main(picture: str) -> None:
             }
             print(json.dumps(said), flush=True)
 
-        window.run(each=tell)
+        play_on(window, player, each=tell)
         Image.fromarray(window.picture()).save(picture)
         hands.script.write(picture + ".json")
         np.save(picture + ".npy", session.go1.simulation.snapshot())

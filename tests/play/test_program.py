@@ -12,6 +12,7 @@ from PIL import Image
 import trainers
 from go1_mtl_gym.errors import InvalidInputError
 from trainers.cli.program import run
+from trainers.play.player import Player
 from trainers.play.record import FilmFile
 
 SCRIPT = {"seconds": 0.4, "moves": [[0.0, "trot"], [0.1, "walk", [0.3, 0.0, 0.0]]]}
@@ -125,6 +126,8 @@ def test_an_episode_of_a_certificate_is_filmed(tmp_path, capsys):
         (["--script", "a.json", "--save-script", "b.json"], "beside it came --save-script"),
         (["--seed", "-1"], "seed"),
         (["phase_free", "--policy", "clocked"], "one policy can drive: 'phase_free' came, and --policy as well"),
+        (["--port", "70000"], "port must be an integer from 0 to 65535"),
+        (["--web", "--script", "a.json", "--record", "b.gif"], "give --record or --web, got both"),
         (["--size", "0", "90"], "width of the picture [pixels] must be an integer from 1"),
     ],
 )
@@ -155,30 +158,48 @@ def test_a_certificate_of_an_older_policy_of_the_package_is_not_replayed_with_th
 
 
 class Unplugged:
-    """A window in which somebody drives half a second and presses Ctrl-C."""
+    """A surface on which somebody drives half a second and presses Ctrl-C."""
 
-    def __init__(self, player, width, height):
+    largest_hz = 1000.0
+
+    def __init__(self, player, *args):
         self.player = player
+        self.link = "http://127.0.0.1:1"
+
+    def poll(self):
+        if self.player.session.steps >= 25:
+            raise KeyboardInterrupt
+        self.player.hands.move_stick((1.0, 0.0, 0.0))
+        self.player.session.step()
+        return True
+
+    def draw(self, notice=None):
+        pass
 
     def picture(self):
         return picture(self.player.session.steps % 200, 1280, 720)
-
-    def run(self, each):
-        self.player.hands.move_stick((1.0, 0.0, 0.0))
-        for _ in range(25):
-            self.player.session.step()
-            each()
-        raise KeyboardInterrupt
 
     def close(self):
         pass
 
 
-def test_what_was_driven_and_filmed_is_kept_when_interrupted(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("trainers.play.window.Window", Unplugged)
+class UnpluggedWindow(Unplugged):
+    ends_by_interrupt = False
+
+
+class UnpluggedPage(Unplugged):
+    ends_by_interrupt = True
+
+
+@pytest.mark.parametrize(("options", "status"), [([], 130), (["--web"], 0)])
+def test_what_was_driven_and_filmed_is_kept_when_interrupted(tmp_path, capsys, monkeypatch, options, status):
+    monkeypatch.setattr("trainers.play.window.Window", UnpluggedWindow)
+    monkeypatch.setattr("trainers.play.browser.surface.Browser", UnpluggedPage)
     monkeypatch.setattr("trainers.play.program.has_display", lambda: True)
+    monkeypatch.setattr("trainers.play.surfaces.has_display", lambda: True)
+    monkeypatch.setattr(Player, "advance", lambda player, seconds: None)
     tape, film = tmp_path / "tape.json", tmp_path / "film.gif"
-    assert run(["play", "--save-script", str(tape), "--record", str(film)]) == 130
+    assert run(["play", "--save-script", str(tape), "--record", str(film), *options]) == status
     script = trainers.Script.read(tape)
     assert script.seconds == 0.5 and script.moves[0].command[0] > 0.5
     with Image.open(film) as image:
@@ -187,14 +208,25 @@ def test_what_was_driven_and_filmed_is_kept_when_interrupted(tmp_path, capsys, m
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems always have a display")
-@pytest.mark.parametrize(("display", "message"), [(None, "there is no display"), (":9999", "cannot open a window")])
-def test_without_a_display_the_sentence_says_what_to_do(display, message):
+@pytest.mark.parametrize(
+    ("display", "options", "messages"),
+    [
+        (None, [], ("there is no display", "the extra `web`")),
+        (None, ["--web"], ("error: a page in a browser needs viser", "the extra `web`")),
+        (":9999", [], ("cannot open a window",)),
+    ],
+)
+def test_where_nothing_can_be_shown_the_sentence_says_what_to_do(display, options, messages):
     environment = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")}
     environment |= {"PYTHONPATH": os.pathsep.join(sys.path)} | ({} if display is None else {"DISPLAY": display})
-    command = [sys.executable, "-m", "trainers", "play"]
+    code = (
+        "import sys; sys.modules['viser'] = None\n"
+        f"from trainers.cli.program import run; sys.exit(run({['play', *options]}))"
+    )
+    command = [sys.executable, "-c", code]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300)
     assert done.returncode == 2 and "Traceback" not in done.stderr
-    assert message in done.stderr and "--record FILE.webp" in done.stderr
+    assert all(message in done.stderr for message in (*messages, "--record FILE.webp"))
 
 
 def test_a_student_drives_without_what_only_training_needs():

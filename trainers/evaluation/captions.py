@@ -299,8 +299,8 @@ def _velocities(page: Page, said: Reading) -> Panel:
         row, command, measured = y + 34 + 20 * i, float(said.command[i]), float(said.measured[i])
         pen.text(x + 8, row, name, 12, TEXT)
         _bar(pen, x + 64, row, 52, command, measured)
-        pen.text(x + 145, row, _number(command), 13, COMMAND, "rm")
-        pen.text(x + 172, row, _number(measured), 13, MEASURED, "rm")
+        pen.text(x + 145, row, number(command), 13, COMMAND, "rm")
+        pen.text(x + 172, row, number(measured), 13, MEASURED, "rm")
         pen.text(x + 175, row, unit, 10, DIM)
     return pen.panel()
 
@@ -314,8 +314,8 @@ def _bar(pen: Pen, x: float, y: float, width: float, command: float, measured: f
     pen.box(mark - 1, y - 6, 3, 12, COMMAND)
 
 
-def _number(value: float) -> str:
-    """One digit behind the point, and no sign before a zero."""
+def number(value: float) -> str:
+    """A velocity in writing: one digit behind the point, and no sign before a zero."""
     return f"{round(value, 1) + 0.0:.1f}"
 
 
@@ -333,12 +333,12 @@ def _contacts(page: Page, said: Reading) -> Panel:
         row = y + 32 + 15 * leg
         pen.text(x + 10, row, name, 11, TEXT)
         pen.box(left, row - 5, 132, 10, TRACK)
-        for begin, end in _spells(said.contacts[:, leg]):
+        for begin, end in spells(said.contacts[:, leg]):
             pen.box(left + step * (first + begin), row - 5, step * (end - begin), 10, CONTACT)
     return pen.panel()
 
 
-def _spells(on: np.ndarray) -> list[tuple[int, int]]:
+def spells(on: np.ndarray) -> list[tuple[int, int]]:
     """(first, one past the last) index of each run of True, of a bool array of shape (n,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]]).astype(int)))
     return [(int(begin), int(end)) for begin, end in edges.reshape(-1, 2)]

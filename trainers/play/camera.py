@@ -23,6 +23,7 @@ class Camera:
     Attributes:
         mjv: what MuJoCo draws from.
         mode: one of `MODES`.
+        orbit: how far whoever looks has turned about the robot by other means than `rotate`, to the left [rad].
     """
 
     def __init__(self, mode: str = MODES[0]) -> None:
@@ -31,12 +32,13 @@ class Camera:
         self.mjv.type = mujoco.mjtCamera.mjCAMERA_FREE
         self.mjv.azimuth, self.mjv.elevation, self.mjv.distance = 40.0, -20.0, 1.7
         self.mjv.lookat[:] = [0.0, 0.0, AIM_HEIGHT]
+        self.orbit = 0.0
         self._yaw, self._time_s = 0.0, 0.0
 
     @property
     def direction_w(self) -> float:
         """Where it looks, from the world's x axis to the left [rad]."""
-        return float(np.radians(self.mjv.azimuth))
+        return float(np.radians(self.mjv.azimuth)) + self.orbit
 
     def next_mode(self) -> None:
         """Change to the mode after the present one."""

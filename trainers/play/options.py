@@ -9,11 +9,16 @@ from trainers.utils.validation import checked_seed
 
 MAX_PIXELS = 16384
 """Of a side of the picture."""
+LOOPBACK = "127.0.0.1"
+PORT = 8080
+MAX_PORT = 65535
+WEB_PACKAGES = ("viser", "trimesh")
+"""Of the extra `web`."""
 
 
 @dataclasses.dataclass(frozen=True)
 class PlayOptions:
-    """Drive a policy or the expert in a window, with held keys or a gamepad, or let a script drive; film it.
+    """Drive a policy or the expert in a window or a browser, by keys or a gamepad, or let a script drive; film it.
 
     Attributes:
         policy: File of a policy, "clocked" or "phase_free" (in the package), or "expert" (clocked if not given). As
@@ -26,6 +31,9 @@ class PlayOptions:
         episode: Which one, such as "operator/trot/17".
         record: Film it: .mp4, .gif, .webp, or .png for the last picture; scripts and replays without a window.
         ghost: Show the pose that the expert asks for.
+        web: Show it in a browser, as without a display, rather than in a window.
+        host: Interface that the browser's page is served on; others than the loopback let others drive.
+        port: Of that page; 0 takes a free one.
         size: Of window or film [pixels] (1280 720 if not given; of GIF and WebP without a window 640 360).
         fps: Pictures per second of the film.
 
@@ -42,6 +50,9 @@ class PlayOptions:
     episode: str | None = None
     record: Path | None = None
     ghost: bool = False
+    web: bool = False
+    host: str = LOOPBACK
+    port: int = PORT
     size: tuple[int, int] | None = None
     fps: int = 25
 
@@ -51,6 +62,7 @@ class PlayOptions:
             checked_seed(self.seed)
         for length, side in zip(self.size or (), ("width", "height")):
             integer_in(length, 1, MAX_PIXELS, f"{side} of the picture [pixels]")
+        integer_in(self.port, 0, MAX_PORT, "port")
 
     def _check_together(self) -> None:
         """Refuse options that contradict each other."""
@@ -61,6 +73,10 @@ class PlayOptions:
                 '--replay FILE and --episode NAME belong together, such as --episode "operator/trot/17"'
             )
         if self.script is not None or self.replay is not None:
+            if self.web and self.record is not None:
+                raise InvalidInputError(
+                    "what a script or a replay does is filmed unseen: give --record or --web, got both"
+                )
             self.refuse_hands(f"{'--script' if self.replay is None else '--replay'} says everything")
         if self.replay is not None and self.seed is not None:
             raise InvalidInputError("--replay says everything; beside it came --seed")

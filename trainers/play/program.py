@@ -16,10 +16,12 @@ from trainers.evaluation.replay import certified_episode
 from trainers.evaluation.script import LONGEST_S, Script
 from trainers.evaluation.tour import DEFAULT_TOUR
 from trainers.play.hands import Hands
+from trainers.play.loop import play_on
 from trainers.play.options import PlayOptions
 from trainers.play.player import Player
 from trainers.play.record import FilmFile, Recording, record
 from trainers.play.session import EXPERT, Session
+from trainers.play.surfaces import opened_surface
 from trainers.policies.packaged import PRETRAINED
 from trainers.utils.cli import writable_file
 
@@ -42,7 +44,8 @@ def play(options: PlayOptions) -> None:
     film = None if options.record is None else FilmFile(writable_file(options.record), options.fps, largest)
     tape = None if options.save_script is None else writable_file(options.save_script)
     script = None if options.script is None else Script.read(options.script)
-    if film is not None and script is None and options.replay is None and not has_display():
+    unseen = film is not None and not (options.web or has_display())
+    if unseen and script is None and options.replay is None:
         options.refuse_hands("without a display --record films a tour, --script FILE another one")
         print("no display: filming the tour of the package; --script FILE films another one", file=sys.stderr)
         script = DEFAULT_TOUR
@@ -54,7 +57,7 @@ def play(options: PlayOptions) -> None:
             _film(player, film, options.size or (FILM_SIZE if film.waits else LARGE_FILM_SIZE))
             return
         try:
-            _play(player, film, options.size or (1280, 720))
+            _play(player, film, options)
         finally:  # interrupted, or the physics has diverged: what was driven is kept
             if tape is not None and hands is not None and session.steps:
                 hands.script.write(tape)
@@ -105,16 +108,17 @@ def _film(player: Player, film: FilmFile, size: tuple[int, int]) -> None:
     print(film.summary)
 
 
-def _play(player: Player, film: FilmFile | None, size: tuple[int, int]) -> None:
-    from trainers.play.window import Window
-
-    window = Window(player, *size)
+def _play(player: Player, film: FilmFile | None, options: PlayOptions) -> None:
+    surface = opened_surface(player, options, options.size or LARGE_FILM_SIZE)
     try:
-        window.run(each=Recording(player, film, window.picture) if film is not None else lambda: None)
+        play_on(surface, player, each=Recording(player, film, surface.picture) if film is not None else lambda: None)
         if film is not None and film.is_still:
-            film.add(window.picture())
+            film.add(surface.picture())
+    except KeyboardInterrupt:
+        if not surface.ends_by_interrupt:
+            raise
     finally:  # interrupted, too: a film has what was seen until then
         if film is not None:
             film.close()
             print(film.summary)
-        window.close()
+        surface.close()

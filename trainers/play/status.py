@@ -35,7 +35,7 @@ def play_panels(size: tuple[int, int], player: Player, notice: str | None = None
     """
     page = Page(*size)
     drawn = [*panels(size, player.session.reading), _status(page, player)]
-    notice = _notice(player) if notice is None else notice
+    notice = notice_of(player) if notice is None else notice
     if notice:
         drawn.append(_line(page, notice))
     if player.help:
@@ -75,7 +75,7 @@ def _status(page: Page, player: Player) -> Panel:
     return pen.panel()
 
 
-def _notice(player: Player) -> str:
+def notice_of(player: Player) -> str:
     """The one thing to be told at this time; empty if there is none."""
     session = player.session
     if session.ended == "time":

@@ -1,15 +1,14 @@
-"""The window: a robot in a player's hands, in real time."""
+"""The window: a robot in a player's hands."""
 
 import time
 import warnings
-from collections.abc import Callable
 from typing import Any
 
 import mujoco
 import numpy as np
 from OpenGL import GL
 
-from go1_mtl_gym.rendering import Pace, RenderingError, has_display
+from go1_mtl_gym.rendering import RenderingError, has_display
 from trainers.evaluation.captions import Panel
 from trainers.play.controls import Controls
 from trainers.play.gamepad import Gamepad
@@ -29,7 +28,7 @@ CAPTIONS_HZ = 15.0
 """How often numbers change; nobody reads faster, and letters take time to draw."""
 CAPACITY = 2000
 """Geoms of the scene."""
-NO_WINDOW = "add --record FILE.webp to film it without one"
+NO_WINDOW = "add --web to drive it in a browser, or --record FILE.webp to film it"
 CLICK_PIXELS = 4
 """A button of the mouse that moved less than this was not dragged."""
 
@@ -47,14 +46,20 @@ class Window:
 
     Attributes:
         controls: what keys and mouse reach.
+        largest_hz: pictures per second, at most.
+        ends_by_interrupt: no: it is closed.
 
     Raises:
         RenderingError: if no window can be opened.
     """
 
+    largest_hz = LARGEST_HZ
+    ends_by_interrupt = False
+
     def __init__(self, player: Player, width: int = 1280, height: int = 720) -> None:
         self._player, self.controls = player, Controls(player)
         self._glfw = _started_glfw()
+        self._gamepad = Gamepad(self.controls, self._glfw)
         self._dragged = 0.0
         self._pointer = (0.0, 0.0)
         self._ghost: Ghost | None = None
@@ -215,31 +220,11 @@ class Window:
     def _on_scroll(self, window: Any, right: float, up: float) -> None:
         self._player.camera.zoom(0.1 * up)
 
-    # -- Playing -------------------------------------------------------------------------------------------------------
-
-    def run(self, until: Callable[[], bool] = lambda: False, each: Callable[[], object] = lambda: None) -> None:
-        """Play until the window is closed, or the player has had enough.
-
-        Args:
-            until: ends it too.
-            each: is called after every picture.
-        """
-        glfw, player, pace = self._glfw, self._player, Pace(LARGEST_HZ)
-        gamepad = Gamepad(self.controls, glfw)
-        before = time.perf_counter()
-        while not (glfw.window_should_close(self._window) or self.controls.quit or until()):
-            glfw.poll_events()
-            gamepad.poll()
-            if player.session.waits_for_expert(player.ghost):
-                self.draw("the expert is being loaded: some seconds, half a minute the first time")
-                player.session.prepare_expert()
-                before = time.perf_counter()  # nobody is to catch up with that
-            now = time.perf_counter()
-            player.advance(min(now - before, 1.0))
-            before = now
-            self.draw()
-            each()
-            pace.wait()
+    def poll(self) -> bool:
+        """Take in keys, mouse and gamepad; False once the window was closed, or the player has had enough."""
+        self._glfw.poll_events()
+        self._gamepad.poll()
+        return not (self._glfw.window_should_close(self._window) or self.controls.quit)
 
 
 def _started_glfw() -> Any:

@@ -1,10 +1,12 @@
-"""OpenGL: which of MuJoCo's back ends draws here, and whether the chosen one does."""
+"""What shows the robot: which of MuJoCo's back ends draws here, whether the chosen one does, and pages in a browser."""
 
 import os
 import sys
 from collections.abc import Iterator
+from importlib.util import find_spec
 
 from trainers.cli.checks.finding import FAILED, NOTE, OK, WARNING, Finding, tried
+from trainers.play.options import WEB_PACKAGES
 
 BACKENDS = {"egl": "off screen, on a GPU or in software", "osmesa": "off screen, in software", "glfw": "in a window"}
 """Value of MUJOCO_GL -> where it draws."""
@@ -44,6 +46,8 @@ def check() -> Iterator[Finding]:
     for name, reason in reasons.items():
         text = f"{name} does not draw: {reason}" if reason else f"{name} draws {BACKENDS[name]}"
         yield Finding("OpenGL", NOTE if reason else OK, text)
+    if not all(find_spec(name) for name in WEB_PACKAGES):
+        yield Finding("browser", NOTE, "no `play --web`: viser and trimesh are not both here", 'pip install ".[web]"')
 
 
 def why_not(backend: str | None) -> str:
