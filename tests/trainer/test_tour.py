@@ -136,7 +136,7 @@ def test_bars_and_strip_show_the_numbers():
 
 @pytest.mark.parametrize(("value", "text"), [(-0.04, "0.0"), (0.0, "0.0"), (-0.06, "-0.1"), (1.26, "1.3")])
 def test_numbers_have_one_digit_and_no_negative_zero(value, text):
-    assert captions._number(value) == text
+    assert captions.number(value) == text
 
 
 # -- Films -------------------------------------------------------------------------------------------------------------
