@@ -30,6 +30,8 @@ STUDIES = {
     "paper_hardware": "experiments.paper.study:Hardware",
     "paper_hardware_half_noise": "experiments.paper.study:HalfNoise",
     "paper_hardware_estimator": "experiments.paper.study:Estimator",
+    "driving_times": "experiments.driving.times:Times",
+    "driving_page": "experiments.driving.page:Page",
     "benchmark_expert": "experiments.benchmarks.expert:ExpertBenchmark",
     "benchmark_training": "experiments.benchmarks.training:TrainingBenchmark",
     "new_gaits": "experiments.new_gaits.study:NewGaits",

@@ -54,6 +54,11 @@ PAGES = {
         "own expert, and nothing about whether it walks.",
         "experiments.paper.study:summary",
     ),
+    "driving": Page(
+        "Taking hold of it",
+        "driving_",
+        "How long it takes until somebody drives, and how true the page in the browser is.",
+    ),
     "benchmarks": Page(
         "Benchmarks",
         "benchmark_",

@@ -19,7 +19,7 @@ from trainers.policies.checkpoint import versions
 from trainers.utils.files import write_json
 
 UNUSED = (
-    *("preset", "n_envs", "device", "threads", "episodes", "video_s"),
+    *("preset", "n_envs", "device", "threads", "episodes", "round_video_s", "video_s", "wandb"),
     *("phase_free_s", "phase_free_history", "phase_free_steps"),
 )
 """Settings of the main job that its policies do not depend on, run as here."""
@@ -94,7 +94,8 @@ class TrainingRun:
 
     def _train(self) -> None:
         defaults = {each.name: each.default for each in dataclasses.fields(JobConfig) if each.name in UNUSED}
-        job = Job(dataclasses.replace(self.config, **defaults | {"n_envs": 1}), self.folder)
+        here = {"n_envs": 1, "round_video_s": 0.0}
+        job = Job(dataclasses.replace(self.config, **defaults | here), self.folder)
         train, held_out = job.demonstrations()
         policy = job.dagger(job.clone(train, held_out), train, held_out)
         errors = trainers.offline_metrics(policy, held_out)

@@ -12,6 +12,7 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
+from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 
 from go1_mtl_gym import BUILT_IN_TASKS, env_id
 from trainers.utils.cli import interpreter
@@ -304,6 +305,11 @@ def test_smoke_prints_one_table_per_gait_and_leaves_its_files(smoke):
 def test_smoke_films_every_gait(smoke):
     out, _ = smoke
     assert all((out / f"{name}.gif").stat().st_size > 10_000 for name in (*SMOKE_TASKS, "gaits"))
+    log = EventAccumulator(str(out / "tensorboard" / out.name)).Reload()
+    films, bounds = log.Images("film"), log.Scalars("certificate/lower_bound")
+    assert len(films) == len(bounds) > 1 and [each.step for each in films] == [each.step for each in bounds]
+    assert all(0.0 <= each.value < 1.0 for each in bounds)
+    assert (films[0].width, films[0].height) == (320, 120), "two gaits side by side"
 
 
 @pytest.mark.slow

@@ -1,11 +1,11 @@
 /** Builds the page into build/site: bundles, MuJoCo without its debug sections, what Python wrote, licenses. */
-import { cpSync, existsSync, mkdirSync, readdirSync, readFileSync, rmSync, statSync, writeFileSync } from "node:fs";
+import { cpSync, existsSync, mkdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
-import { gzipSync } from "node:zlib";
 import { build } from "esbuild";
 
+import { sizes, total } from "./sizes.mjs";
 import { withoutSections } from "./wasm_sections.mjs";
 
 const root = dirname(fileURLToPath(import.meta.url));
@@ -53,23 +53,7 @@ function licenses() {
 
 /** Sizes, as they are sent with compression. */
 function report() {
-  const constants = JSON.parse(readFileSync(join(site, "constants.json"), "utf8"));
-  const { shared, heads } = constants.policies.multi_head;
-  const later = new Set(Object.values(heads).slice(1).map(({ file }) => file));
-  for (const { estimator, student } of Object.values(constants.policies)) {
-    if (estimator) [estimator.weights.file, student.shared.file, ...Object.values(student.heads).map(({ file }) => file)].forEach((file) => later.add(file));
-  }
-  for (const file of [shared.file, Object.values(heads)[0].file]) later.delete(file);
-  const sums = { "before the first motion": [0, 0], "in all": [0, 0] };
-  const files = readdirSync(site, { recursive: true }).filter((name) => statSync(join(site, name)).isFile());
-  for (const name of files.sort()) {
-    const bytes = readFileSync(join(site, name)), packed = gzipSync(bytes, { level: 9 }).length;
-    console.log(`${(bytes.length / 1e6).toFixed(3).padStart(8)} MB ${(packed / 1e6).toFixed(3).padStart(8)} MB gzipped  ${name}`);
-    for (const [when, sum] of Object.entries(sums)) {
-      if (when !== "in all" && (later.has(name) || name === "licenses.txt")) continue;
-      sum[0] += bytes.length;
-      sum[1] += packed;
-    }
-  }
-  for (const [when, [bytes, packed]] of Object.entries(sums)) console.log(`${(bytes / 1e6).toFixed(2)} MB, ${(packed / 1e6).toFixed(2)} MB gzipped, ${when}`);
+  const files = sizes(site), line = ({ bytes, gzipped }) => `${(bytes / 1e6).toFixed(3).padStart(8)} MB ${(gzipped / 1e6).toFixed(3).padStart(8)} MB gzipped`;
+  for (const file of files) console.log(`${line(file)}  ${file.name}`);
+  console.log(`${line(total(files.filter(({ first }) => first)))}  before the first motion\n${line(total(files))}  in all`);
 }

@@ -1,28 +1,44 @@
 /** What the time until the first motion goes into, in Chromium with an empty cache: `npm run first-motion`. */
+import { fileURLToPath } from "node:url";
 import puppeteer from "puppeteer-core";
 
 import { serve } from "./serve.mjs";
 import { browserOptions } from "./tests/smoke/chromium.mjs";
 
-const [folder, runs = "1"] = process.argv.slice(2);
 const PATIENCE_MS = 600000;
 const TASKS = ["ThreadControllerImpl::RunTask", "ThreadPool_RunTask"];
 const BROWSERS_OWN = /Start$|End$|^dom[A-Z]|^(first|largest)[A-Z]|^markAs/;
-const server = await serve(0, folder || undefined);
-for (let run = 0; run < Number(runs); run++) {
+const CATEGORIES = ["devtools.timeline", "blink.user_timing", "toplevel", "v8", "disabled-by-default-v8.compile", "v8.wasm"];
+
+/** Load the page in a new browser; returns what `look` makes of it and of the time of the first motion [ms]. */
+export async function atFirstMotion(server, look, before = async () => {}) {
   const browser = await puppeteer.launch({ ...browserOptions(), protocolTimeout: PATIENCE_MS });
-  const page = await browser.newPage();
-  await page.setViewport({ width: 1280, height: 800 });
-  await page.tracing.start({ categories: ["devtools.timeline", "blink.user_timing", "toplevel", "v8", "disabled-by-default-v8.compile", "v8.wasm"] });
-  await page.goto(`http://127.0.0.1:${server.address().port}/`, { timeout: PATIENCE_MS });
-  await page.waitForFunction(() => performance.getEntriesByName("first motion").length > 0, { timeout: PATIENCE_MS, polling: 100 });
-  const firstMs = await page.evaluate(() => performance.getEntriesByName("first motion")[0].startTime);
-  const events = JSON.parse(Buffer.from(await page.tracing.stop()).toString()).traceEvents;
-  console.log(`first motion after ${(firstMs / 1000).toFixed(2)} s`);
-  report(events, firstMs);
-  await browser.close();
+  try {
+    const page = await browser.newPage();
+    await page.setViewport({ width: 1280, height: 800 });
+    await before(page);
+    await page.goto(`http://127.0.0.1:${server.address().port}/`, { timeout: PATIENCE_MS });
+    await page.waitForFunction(() => performance.getEntriesByName("first motion").length > 0, { timeout: PATIENCE_MS, polling: 100 });
+    return await look(page, await page.evaluate(() => performance.getEntriesByName("first motion")[0].startTime));
+  } finally {
+    await browser.close();
+  }
 }
-server.close();
+
+if (process.argv[1] === fileURLToPath(import.meta.url)) {
+  const [folder, runs = "1"] = process.argv.slice(2), server = await serve(0, folder || undefined);
+  for (let run = 0; run < Number(runs); run++) {
+    await atFirstMotion(
+      server,
+      async (page, firstMs) => {
+        console.log(`first motion after ${(firstMs / 1000).toFixed(2)} s`);
+        report(JSON.parse(Buffer.from(await page.tracing.stop()).toString()).traceEvents, firstMs);
+      },
+      (page) => page.tracing.start({ categories: CATEGORIES }),
+    );
+  }
+  server.close();
+}
 
 /** Marks, and the CPU time of each thread and of what took longest, from the beginning to the first motion. */
 function report(events, firstMs) {

@@ -334,7 +334,14 @@ def test_without_a_display_a_page_is_served(tmp_path):
     environment = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")}
     environment |= {"PYTHONPATH": os.pathsep.join(sys.path)}
     command = [sys.executable, "-m", "trainers", "play", "--port", "0", "--save-script", str(tmp_path / "did.json")]
-    process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        command,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # tests in a background job ignore Ctrl-C
+    )
     try:
         line = process.stdout.readline()
         assert line.startswith("there is no display: drive in a browser at http://127.0.0.1:")

@@ -1,9 +1,11 @@
 """TensorBoard log and figures."""
 
+import io
 import json
 
 import numpy as np
 import pytest
+from PIL import Image
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 from tensorboard.plugins.hparams.plugin_data_pb2 import HParamsPluginData
 
@@ -11,13 +13,14 @@ import trainers
 from go1_mtl_gym.errors import InvalidInputError
 from tests.trainer.stub_env import make_stub
 from trainers import evaluate, joint_target_figure, log_figure, log_round, log_text, make_logger, offline_metrics
-from trainers.utils.logging import log_settings
+from trainers.utils.gif import Gif
+from trainers.utils.logging import log_film, log_settings
 
 
 def test_round_text_and_figure_reach_tensorboard(policy, demos, tmp_path):
     logger = make_logger(tmp_path)
     result = evaluate("expert", "trot", 1, 3.0, make_env=make_stub)
-    log_round(logger, 2, {"trot": result.as_dict()}, offline_metrics(policy, demos))
+    log_round(logger, 2, {"trot": result.as_dict()}, offline_metrics(policy, demos), {"lower_bound": 0.5})
     log_text(logger, "config", {"seed": 1, "nan": float("nan")})
     log_figure(logger, "joint_targets", joint_target_figure(policy, demos), 2)
     logger.close()
@@ -27,8 +30,28 @@ def test_round_text_and_figure_reach_tensorboard(policy, demos, tmp_path):
     scalar = gaits["trot"].Scalars("closed_loop/success_rate")[0]
     assert (scalar.step, scalar.value) == (2, 1.0)
     tags = EventAccumulator(str(tmp_path)).Reload().Tags()
-    assert not tags["scalars"]
+    assert tags["scalars"] == ["certificate/lower_bound"]
     assert tags["images"] == ["joint_targets"] and "config/text_summary" in tags["tensors"]
+
+
+def moving_picture() -> Gif:
+    file = io.BytesIO()
+    images = [Image.new("RGB", (24, 16), (40 * i, 0, 0)) for i in range(3)]
+    images[0].save(file, format="GIF", save_all=True, append_images=images[1:], duration=100)
+    return Gif(file.getvalue())
+
+
+def test_a_film_is_a_moving_picture_of_tensorboard(tmp_path):
+    logger, film = make_logger(tmp_path), moving_picture()
+    log_film(logger, "film", film, 3)
+    log_film(logger, "film", film, 5)
+    logger.close()
+    events = EventAccumulator(str(tmp_path)).Reload()
+    assert [each.step for each in events.Images("film")] == [3, 5]
+    shown = events.Images("film")[0]
+    assert (shown.width, shown.height) == (24, 16)
+    with Image.open(io.BytesIO(shown.encoded_image_string)) as image:
+        assert image.n_frames == 3
 
 
 def test_settings_and_results_are_what_runs_are_compared_by(tmp_path):
@@ -86,6 +109,7 @@ def test_weights_and_biases_gets_numbers_pictures_and_settings(policy, demos, tm
     logger.dump(7)
     log_text(logger, "configuration", {"preset": "smoke"})
     log_figure(logger, "joint_targets", joint_target_figure(policy, demos), 7)
+    log_film(logger, "film", moving_picture(), 8)
     log_settings(logger, {"seed": 1}, {"result/r2": 0.9}, 9)
     logger.close()
     first = (tmp_path / "wandb_run_id").read_text()
@@ -107,7 +131,7 @@ def test_weights_and_biases_gets_numbers_pictures_and_settings(policy, demos, tm
     assert any(row.get("closed_loop/success_rate/trot") == 0.5 and row["step"] == 7 for row in history)
     assert any(row.get("result/r2") == 0.9 and row["step"] == 9 for row in history)
     assert not any("dagger/rounds" in row for row in history)
-    assert list(tmp_path.rglob("media/images/*.png"))
+    assert list(tmp_path.rglob("media/images/*.png")) and list(tmp_path.rglob("media/videos/*.gif"))
     config = {item.key: item.value_json for record in records for item in record.config.update}
     config |= {item.key: item.value_json for record in records for item in record.run.config.update}
     assert config["seed"] == "1" and "smoke" in config["configuration"]

@@ -88,6 +88,7 @@ class JobConfig:
         episode_s: their length [s].
         command_interval: time between drawn commands in them [s].
         round_episodes: episodes per task after each DAgger round.
+        round_video_s: length of the film of every round in the log; 0 makes none.
         video_s: length of the videos.
         wandb: whether to log to Weights & Biases too, with the package of that name.
 
@@ -136,6 +137,7 @@ class JobConfig:
     episode_s: float = _from(0, 30.0, above=True)
     command_interval: float = _from(0, 5.0, above=True)
     round_episodes: int = _from(1, 2)
+    round_video_s: float = _from(0, 2.0)
     video_s: float = _from(0, 4.0, above=True)
     wandb: bool = False
 

@@ -11,8 +11,8 @@ EXPERT_S, POLICY_S, ROUND_S = 0.40, 0.19, 0.34
 STEP_S, PHASE_STEP_S = 0.023, 0.03
 """Per gradient step of a network of `STEP_WIDTH` units with a batch of `STEP_BATCH`; of the phase estimator."""
 STEP_WIDTH, STEP_BATCH = 256, 1024
-FILM_S = 1.0
-"""Per second of film."""
+FILM_S, SMALL_FILM_S = 1.0, 0.5
+"""Per second of film, and of a small one."""
 BEGIN_S = 3.0
 """Of every stage: processes begin, files are read."""
 AGENTS = 5
@@ -39,6 +39,7 @@ def parts(config: JobConfig) -> dict[str, Parts]:
             "evaluate": ((config.rounds + 1) * gaits, config.round_episodes * episodes_s),
             "collect": (config.rounds, BEGIN_S + ROUND_S * rate * gaits * config.dagger_s),
             "clone": (config.rounds, step_s * config.round_steps),
+            "film": (config.rounds + 1, SMALL_FILM_S * gaits * config.round_video_s),
         }
     if config.phase_free_s and config.has_clock:
         watched_s = POLICY_S * rate * gaits * config.phase_free_s

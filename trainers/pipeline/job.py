@@ -1,7 +1,7 @@
 """The main job: stages that leave their results on disk, and take from there what is done."""
 
 import contextlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -9,6 +9,7 @@ from typing import Any
 import torch
 from stable_baselines3.common.vec_env import VecEnv
 
+from go1_mtl_gym.rendering import RenderingError
 from trainers.algorithms.bc import train_bc
 from trainers.algorithms.dagger import DAggerTrainer
 from trainers.algorithms.phase_free import train_phase_free
@@ -17,19 +18,20 @@ from trainers.data.demonstrations import Demonstrations
 from trainers.data.environments import base_env, make_env, make_venv
 from trainers.evaluation.closed_loop import evaluate
 from trainers.evaluation.figures import joint_target_figure
-from trainers.evaluation.metrics import offline_metrics
+from trainers.evaluation.metrics import lower_bound, offline_metrics
 from trainers.pipeline.baselines import baseline_names, train_baselines
 from trainers.pipeline.config import NOISE_RAD, JobConfig
 from trainers.pipeline.demonstrations import held_out_jobs, training_jobs
 from trainers.pipeline.new_policy import new_policy
-from trainers.pipeline.pictures import save_videos
+from trainers.pipeline.pictures import save_small_video, save_videos
 from trainers.pipeline.run_folder import RunFolder, read_json
 from trainers.pipeline.stages import Stages, announced_if_slow
 from trainers.policies.checkpoint import versions
 from trainers.policies.loading import load
 from trainers.policies.multi_head import MultiHeadPolicy
 from trainers.utils.files import json_ready, write_json
-from trainers.utils.logging import log_figure, log_round, log_settings, log_text, make_logger
+from trainers.utils.gif import Gif
+from trainers.utils.logging import log_figure, log_film, log_round, log_settings, log_text, make_logger
 from trainers.utils.wandb_log import check_wandb
 
 DRAWN, OPERATOR = "drawn", "operator"
@@ -154,12 +156,18 @@ class Job:
                 venv.close()
 
     def _log_round(self, policy: MultiHeadPolicy, held_out: Demonstrations, round_num: int) -> None:
-        """A quick look at the closed loop and the one-step errors, for TensorBoard."""
+        """A quick look at the closed loop, in figures and a film, for TensorBoard."""
         agent = f"round-{round_num}"
         episodes = self.config.round_episodes
         protocol = DRAWN if self.config.operator is None else OPERATOR
         closed_loop = {task: self.closed_loop(policy, agent, task, episodes, protocol) for task in self.config.tasks}
-        log_round(self.logger, self._steps_after(round_num), closed_loop)
+        step = self._steps_after(round_num)
+        log_round(self.logger, step, closed_loop, certified=_certified(closed_loop.values()))
+        if self.config.round_video_s:
+            with contextlib.suppress(RenderingError):  # said once, where the other pictures are drawn
+                path = self.folder.film(round_num)
+                save_small_video(policy, self.config.tasks, self.config.round_video_s, path)
+                log_film(self.logger, "film", Gif(path.read_bytes()), step)
 
     def phase_free(self, policy: MultiHeadPolicy) -> dict[str, Any]:
         """The policy with an estimate of the phase in its clock's place, by name; nothing where it has no clock."""
@@ -316,6 +324,14 @@ class Job:
 
     def _untrained(self) -> MultiHeadPolicy:
         return new_policy(self.config, self.config.env_kwargs)
+
+
+def _certified(closed_loop: Iterable[Mapping[str, Any]]) -> dict[str, float]:
+    """What a certificate would say of the episodes of all gaits together: success rate and its lower bound, at 95 %."""
+    scores = list(closed_loop)
+    trials = sum(each["episodes"] for each in scores)
+    successes = sum(round(each["success_rate"] * each["episodes"]) for each in scores)
+    return {"success_rate": successes / trials, "lower_bound": lower_bound(successes, trials)}
 
 
 def _means(tasks: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> dict[str, float]:

@@ -25,6 +25,7 @@ PRESETS: dict[str, dict[str, Any]] = {
         "episodes": 2,
         "episode_s": 5.0,
         "round_episodes": 1,
+        "round_video_s": 1.0,
         "video_s": 1.0,
     },
     "shipped": {

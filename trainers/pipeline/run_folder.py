@@ -13,7 +13,7 @@ from go1_mtl_gym.errors import InvalidInputError
 from trainers.pipeline.config import JobConfig
 from trainers.utils.files import write_json
 
-NOT_SETTINGS = ("n_envs", "threads", "wandb")
+NOT_SETTINGS = ("n_envs", "threads", "round_video_s", "wandb")
 """Fields of `JobConfig` that may change when an interrupted run goes on."""
 
 
@@ -74,6 +74,10 @@ class RunFolder:
         return self.parts / "closed_loop" / f"{agent}-{task}-{protocol}.json"
 
     # -- Housekeeping --------------------------------------------------------------------------------------------------
+
+    def film(self, round_num: int) -> Path:
+        """The small film of the policy after so many DAgger rounds."""
+        return self.parts / f"round-{round_num}.gif"
 
     def claim(self, config: JobConfig) -> None:
         """Write the settings into the folder, or see that those in it are the same, and read the times so far.

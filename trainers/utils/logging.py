@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from imitation.util.logger import HierarchicalLogger, make_output_format
 from stable_baselines3.common.logger import Figure, HParam, KVWriter, Logger
+from tensorboard.compat.proto.summary_pb2 import Summary
 
 from trainers.utils.files import json_ready
+from trainers.utils.gif import Gif
 from trainers.utils.wandb_log import WeightsAndBiases
 
 if TYPE_CHECKING:
@@ -31,7 +33,7 @@ class TensorBoard(KVWriter):
 
     def __init__(self, folder: str) -> None:
         self._folder = folder
-        self._writers = {"": make_output_format("tensorboard", folder)}
+        self._writers: dict[str, Any] = {"": make_output_format("tensorboard", folder)}
 
     def write(self, key_values: dict[str, Any], key_excluded: dict[str, tuple[str, ...]], step: int = 0) -> None:
         """Write what was recorded since the last time.
@@ -50,7 +52,13 @@ class TensorBoard(KVWriter):
                 self._writers[task] = make_output_format("tensorboard", str(Path(self._folder) / task))
             writer = self._writers[task]
             values = {tag: key_values[key] for key, tag in tags.items()}
+            films = {tag: values.pop(tag) for tag, value in list(values.items()) if isinstance(value, Gif)}
             writer.write(values, {tag: key_excluded.get(key, ()) for key, tag in tags.items()}, step)
+            for tag, film in films.items():  # stable-baselines3's own films need moviepy, to become just such a file
+                image = Summary.Image(height=film.height, width=film.width, encoded_image_string=film.content)
+                summary = Summary(value=[Summary.Value(tag=tag, image=image)])
+                writer.writer.file_writer.add_summary(summary, step)
+                writer.writer.flush()
 
     def close(self) -> None:
         """Close all files."""
@@ -86,6 +94,7 @@ def log_round(
     step: int,
     closed_loop: Mapping[str, Mapping[str, Any]] | None = None,
     offline: Mapping[str, Mapping[str, float]] | None = None,
+    certified: Mapping[str, float] | None = None,
 ) -> None:
     """Write the scores of one DAgger round.
 
@@ -95,6 +104,7 @@ def log_round(
         closed_loop: task -> ``as_dict()`` of what `trainers.evaluate` returned; recorded as
             ``closed_loop/<figure>/<task>``. A figure that is None, because every episode fell too early, is left out.
         offline: task -> result of `trainers.offline_metrics`; tags ``offline/<figure>/<task>``.
+        certified: figures of all gaits together; tags ``certificate/<figure>``.
     """
     for task, result in (closed_loop or {}).items():
         for name in ROUND_FIGURES:
@@ -103,6 +113,8 @@ def log_round(
     for task, scores in (offline or {}).items():
         for name, value in scores.items():
             logger.record(f"offline/{name}/{task}", value)
+    for name, value in (certified or {}).items():
+        logger.record(f"certificate/{name}", value)
     logger.dump(step)
 
 
@@ -116,6 +128,12 @@ def log_text(logger: HierarchicalLogger, tag: str, value: Any, step: int = 0) ->
 def log_figure(logger: HierarchicalLogger, tag: str, figure: "matplotlib.figure.Figure", step: int = 0) -> None:
     """Write a matplotlib figure."""
     logger.record(tag, Figure(figure, close=False), exclude=NOT_TEXT)
+    logger.dump(step)
+
+
+def log_film(logger: HierarchicalLogger, tag: str, film: Gif, step: int = 0) -> None:
+    """Write a moving picture, which TensorBoard plays among its images."""
+    logger.record(tag, film, exclude=NOT_TEXT)
     logger.dump(step)
 
 

@@ -1,6 +1,7 @@
 """The shared log in Weights & Biases, where its package is installed and it is asked for."""
 
 import importlib.util
+import io
 import os
 import uuid
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Any
 from stable_baselines3.common.logger import Figure, HParam, Image, KVWriter, Video
 
 from go1_mtl_gym.errors import InvalidInputError
+from trainers.utils.gif import Gif
 
 PROJECT = "go1-mtl-gym"
 """Of the runs, unless the environment variable WANDB_PROJECT names another."""
@@ -85,6 +87,8 @@ class WeightsAndBiases(KVWriter):
             return self._wandb.Image(value.figure)
         if isinstance(value, Image):
             return self._wandb.Image(value.image)
+        if isinstance(value, Gif):
+            return self._wandb.Video(io.BytesIO(value.content), format="gif")
         if isinstance(value, Video):
             return self._wandb.Video(value.frames[0].numpy(), fps=int(value.fps))
         return float(value)

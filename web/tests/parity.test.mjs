@@ -2,30 +2,10 @@
 import assert from "node:assert/strict";
 import test from "node:test";
 
-import { drive } from "./script.mjs";
+import { compareEnd, compareSteps, distance } from "./compare.mjs";
 import { makeController, makeRobot, readReference } from "./load.mjs";
 
 const POLICY = 1e-6, OBSERVATION = 1e-6, POSITION_M = 0.01;
-
-/** Largest absolute difference of numbers. */
-function distance(first, second) {
-  assert.equal(first.length, second.length);
-  let largest = 0;
-  for (let i = 0; i < first.length; i++) largest = Math.max(largest, Math.abs(first[i] - second[i]));
-  return largest;
-}
-
-/** Drive as the reference was driven; `step` makes one. */
-function follow(robot, given, step) {
-  const [[, task, command]] = given.moves;
-  const [pushStep, push] = given.push;
-  robot.reset(task, command, given.start);
-  for (let i = 0; i < given.actions.length; i++) {
-    drive(robot, given.moves, i);
-    if (i === pushStep) robot.simulation.push(push);
-    step(i);
-  }
-}
 
 /** Name of the task in an observation. */
 function taskOf(tasks, observation) {
@@ -38,24 +18,17 @@ for (const kind of ["multi_head", "phase_free"]) {
 
   for (const [name, given] of Object.entries(drives)) {
     test(`${kind}, ${name}: observation and action of every step from the same states`, (t) => {
-      let seen = 0, done = 0;
-      follow(robot, given, (i) => {
-        seen = Math.max(seen, distance(robot.controller.observation, given.observations[i]));
-        done = Math.max(done, distance(robot.controller.act(), given.actions[i]));
-        robot.simulation.state = given.states[i]; // physics is chaotic: what rounding makes of it is not for here
-        robot.apply(given.actions[i]);
-      });
-      t.diagnostic(`largest differences ${seen.toExponential(1)} and ${done.toExponential(1)}`);
-      assert.ok(seen <= OBSERVATION, `observations differ by ${seen}`);
-      assert.ok(done <= POLICY, `actions differ by ${done}`);
+      const { observation, action } = compareSteps(robot, given);
+      t.diagnostic(`largest differences ${observation.toExponential(1)} and ${action.toExponential(1)}`);
+      assert.ok(observation <= OBSERVATION, `observations differ by ${observation}`);
+      assert.ok(action <= POLICY, `actions differ by ${action}`);
     });
 
     test(`${kind}, ${name}: where it ends when its own network drives`, (t) => {
-      follow(robot, given, () => robot.step());
-      const apart = distance(robot.simulation.data.qpos.slice(0, 3), given.qpos.slice(0, 3));
-      t.diagnostic(`${apart.toExponential(1)} m apart after ${given.actions.length / 50} s`);
-      assert.equal(robot.simulation.fallen, given.fallen);
-      assert.ok(apart <= POSITION_M, `the robots end ${apart} m apart`);
+      const { apartM, fallen } = compareEnd(robot, given);
+      t.diagnostic(`${apartM.toExponential(1)} m apart after ${given.actions.length / 50} s`);
+      assert.equal(fallen, given.fallen);
+      assert.ok(apartM <= POSITION_M, `the robots end ${apartM} m apart`);
     });
   }
 }
