@@ -5,12 +5,12 @@ from pathlib import Path
 
 import trainers
 from experiments import main_job
-from experiments.results import read_json, without_folders
+from experiments.results import without_folders
 from go1_mtl_gym.errors import InvalidInputError
 from trainers import Certificate
 from trainers.evaluation.agents import identity
 from trainers.evaluation.certificate import FILE
-from trainers.utils.files import write_atomically
+from trainers.utils.files import read_object, write_atomically
 
 COPIED = ("joint_targets.png", "gaits.gif")
 """Files of a run that are published as they are."""
@@ -43,7 +43,7 @@ def copy_run(run: Path, root: Path) -> None:
             preset.
         go1_mtl_gym.rendering.RenderingError: if the film cannot be drawn on this machine.
     """
-    preset = read_json(run / SETTINGS).get("preset") if (run / SETTINGS).is_file() else None
+    preset = read_object(run / SETTINGS, "file of settings").get("preset") if (run / SETTINGS).is_file() else None
     measured = ("metrics.json", *COPIED)
     wanted = {PUBLISHED_PRESET: measured, SHIPPED_PRESET: tuple(POLICIES)}.get(str(preset), (*measured, *POLICIES))
     missing = [name for name in (SETTINGS, *wanted) if not (run / name).is_file()]
@@ -80,7 +80,7 @@ def film(policy: Path, root: Path) -> None:
 
 
 def _copy_results(run: Path, folder: Path) -> None:
-    metrics = read_json(run / "metrics.json")
+    metrics = read_object(run / "metrics.json", "file of metrics")
     results = main_job.results_of(metrics, without_folders(metrics.get("command", "")))
     results.write(folder / f"{main_job.NAME}.json")
     for name in COPIED:

@@ -13,7 +13,7 @@ import numpy as np
 
 from experiments.stats import Rate
 from go1_mtl_gym.errors import InvalidInputError
-from trainers.utils.files import json_ready, write_atomically
+from trainers.utils.files import json_ready, read_object, write_atomically
 
 Record = dict[str, Any]
 """{"study", "agent", "task", "condition", "seed", metrics ...}."""
@@ -107,7 +107,7 @@ class Results:
         Raises:
             InvalidInputError: if the file is missing, no JSON, or holds something else.
         """
-        data = read_json(path)
+        data = read_object(path, "file of results")
         try:
             return cls(**data | {"records": tuple(data["records"])})
         except (KeyError, TypeError) as error:
@@ -129,23 +129,6 @@ class Results:
     def of(self, **values: Any) -> Group:
         """The records that have these values, in their order."""
         return Group(self.records).where(**values)
-
-
-def read_json(path: Path) -> dict[str, Any]:
-    """The object in a JSON file.
-
-    Raises:
-        InvalidInputError: if the file is missing or holds something else.
-    """
-    try:
-        value = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise InvalidInputError(f"there is no {path}") from error
-    except ValueError as error:
-        raise InvalidInputError(f"{path} is not JSON: {error}") from error
-    if not isinstance(value, dict):
-        raise InvalidInputError(f"{path} must hold a JSON object, got {type(value).__name__}")
-    return value
 
 
 FOLDERS, CHECKOUTS = ("--out", "--cache"), ("--go2-convex-mpc",)

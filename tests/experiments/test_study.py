@@ -164,7 +164,7 @@ def test_results_are_written_with_one_record_a_line_and_read_again(study, tmp_pa
     assert sum('"study": "noted", "agent"' in line for line in lines) == len(results.records)
     assert Results.read(tmp_path / "noted.json") == results
     (tmp_path / "bad.json").write_text('{"records": []}')
-    for name, reason in (("missing", "there is no"), ("bad", "does not hold the results")):
+    for name, reason in (("missing", "no file of results"), ("bad", "does not hold the results")):
         with pytest.raises(InvalidInputError, match=reason):
             Results.read(tmp_path / f"{name}.json")
 

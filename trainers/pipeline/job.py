@@ -24,12 +24,12 @@ from trainers.pipeline.config import NOISE_RAD, JobConfig
 from trainers.pipeline.demonstrations import held_out_jobs, training_jobs
 from trainers.pipeline.new_policy import new_policy
 from trainers.pipeline.pictures import save_small_video, save_videos
-from trainers.pipeline.run_folder import RunFolder, read_json
+from trainers.pipeline.run_folder import RunFolder
 from trainers.pipeline.stages import Stages, announced_if_slow
 from trainers.policies.checkpoint import versions
 from trainers.policies.loading import load
 from trainers.policies.multi_head import MultiHeadPolicy
-from trainers.utils.files import json_ready, write_json
+from trainers.utils.files import json_ready, read_object, write_json
 from trainers.utils.gif import Gif
 from trainers.utils.logging import log_figure, log_film, log_round, log_settings, log_text, make_logger
 from trainers.utils.wandb_log import check_wandb
@@ -261,7 +261,7 @@ class Job:
             protocol: `DRAWN`, commands that change at times, or `OPERATOR`, the hands of the configuration in one gait.
         """
         path = self.folder.closed_loop(agent, task, protocol)
-        known = read_json(path)
+        known = read_object(path, "file of scores") if path.is_file() else None
         if known is None:
             known = self._measured(policy, task, episodes, protocol) | {"learner": agent}
             write_json(path, known)

@@ -9,10 +9,9 @@ from typing import Any
 from go1_mtl_gym.rendering import RenderingError
 from trainers.pipeline.config import JobConfig
 from trainers.pipeline.job import Job
-from trainers.pipeline.run_folder import read_json
 from trainers.pipeline.summary import summary
 from trainers.utils.cli import interpreter
-from trainers.utils.files import write_atomically
+from trainers.utils.files import read_object, write_atomically
 from trainers.utils.folder_lock import alone_in
 from trainers.utils.report import results_table
 
@@ -55,7 +54,7 @@ def all_stages(job: Job) -> dict[str, Any]:
         return job.run()
     except RenderingError as error:
         print(f"no videos: {error}")
-    return read_json(job.folder.metrics)
+    return read_object(job.folder.metrics, "file of metrics")
 
 
 def next_steps(folder: Path, drive: str) -> Mapping[str, str]:

@@ -2,16 +2,14 @@
 
 import contextlib
 import dataclasses
-import json
 import time
 from collections.abc import Iterator
-from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from go1_mtl_gym.errors import InvalidInputError
 from trainers.pipeline.config import JobConfig
-from trainers.utils.files import write_json
+from trainers.utils.files import read_object, write_json
 
 NOT_SETTINGS = ("n_envs", "threads", "round_video_s", "wandb")
 """Fields of `JobConfig` that may change when an interrupted run goes on."""
@@ -92,7 +90,7 @@ class RunFolder:
         elif known != settings:
             changed = ", ".join(sorted(name for name in settings if known.get(name) != settings[name]))
             raise InvalidInputError(f"{self.path} holds a run with other settings ({changed}); choose another --out")
-        self.seconds = read_json(self._times) or {}
+        self.seconds = read_object(self._times, "list of times") if self._times.is_file() else {}
 
     @contextlib.contextmanager
     def stage(self, name: str) -> Iterator[None]:
@@ -109,22 +107,11 @@ class RunFolder:
         return self.parts / "seconds.json"
 
 
-def read_json(path: str | PathLike[str]) -> Any:
-    """What a JSON file holds; None without a file."""
-    try:
-        return json.loads(Path(path).read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        return None
-
-
 def _read_settings(folder: Path) -> dict[str, Any] | None:
-    try:
-        known = read_json(folder / "config.json")
-    except (OSError, ValueError) as error:
-        raise InvalidInputError(f"{folder} must be a folder of a training run or a new one: {error}") from error
-    if not (known is None or isinstance(known, dict)):
-        raise InvalidInputError(f"{folder / 'config.json'} must hold the settings of a training run, got {known!r:.60}")
-    return known
+    path = folder / "config.json"
+    if folder.exists() and not folder.is_dir():
+        raise InvalidInputError(f"a folder of a training run or a new one was expected, got the file {folder}")
+    return read_object(path, "file of settings of a training run") if path.exists() else None
 
 
 def _write_settings(folder: Path, settings: dict[str, Any]) -> None:

@@ -58,6 +58,20 @@ def read_json(path: str | os.PathLike[str], kind: str) -> Any:
         raise InvalidInputError(f"{os.fspath(path)!r} is no {kind}: its brackets are nested too deep") from None
 
 
+def read_object(path: str | os.PathLike[str], kind: str) -> dict[str, Any]:
+    """The object in a JSON file, with the arguments of `read_json`.
+
+    Raises:
+        InvalidInputError: as `read_json`, or if the file holds another value.
+    """
+    value = read_json(path, kind)
+    if not isinstance(value, dict):
+        raise InvalidInputError(
+            f"{os.fspath(path)!r} is no {kind}: a JSON object was expected, got {type(value).__name__}"
+        )
+    return value
+
+
 def json_ready(value: Any) -> Any:
     """Copy of nested dicts and sequences in which NaN and infinity are None and numpy values are Python's."""
     if isinstance(value, dict):
