@@ -77,6 +77,7 @@ def tables(results: Results) -> list[str]:
         "so the table says how well each network fits its own expert, not which one is better.",
         "## Wall time",
         markdown(["stage", "wall time [s]"], [[stage, f"{value:.0f}"] for stage, value in results.seconds.items()]),
+        "As long as this run took, whatever else the machine did meanwhile.",
     ]
 
 
