@@ -69,7 +69,7 @@ class NMPCConfig:
     """Everything that can be tuned about the expert.
 
     Attributes:
-        com_height: mean height of the centre of mass [m].
+        com_height: mean height of the centre of mass in gaits whose `body_height` is 1 [m].
         linearization: "reference", or "shifted" for real-time iterations, which remember the last solution.
         sqp_iterations: most QPs per call.
         sqp_tolerance: a QP whose solution is as near as this to the trajectory that it was linearized along is the
@@ -225,7 +225,7 @@ class NMPCExpert:
         motion = self.motion(state)
         velocity_w = mean_velocity(state, dynamics, motion)
         horizon = pose_horizon(
-            state, dynamics, motion, velocity_w, config.footholds, config.com_height, config.mpc.steps
+            state, dynamics, motion, velocity_w, config.footholds, self._com_height(state), config.mpc.steps
         )
         earlier = self._recall.before(state) if config.linearization == "shifted" else None
         if earlier is None:
@@ -264,8 +264,12 @@ class NMPCExpert:
         if state.standing:
             return standing_motion(state.gait)
         inertia = self._model.standing_moments(state.payload_kg)
-        height = self.config.com_height - robot.FOOT_RADIUS
+        height = self._com_height(state) - robot.FOOT_RADIUS
         return nominal_motion(state.gait, inertia, height, robot.MASS + state.payload_kg)
+
+    def _com_height(self, state: RobotState) -> float:
+        """Mean height of the centre of mass in the state's gait [m]."""
+        return self.config.com_height * state.gait.body_height
 
 
 def mean_velocity(state: RobotState, dynamics: Dynamics, motion: NominalMotion) -> np.ndarray:

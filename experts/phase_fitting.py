@@ -168,7 +168,7 @@ def _residuals(
         _parts(mean[:, None] - complex(vx, vy)) / scales.sway,
         (cycle.tilt - whole_body_attitude(state, dynamics)[:2]) / scales.tilt,
         (cycle.rate - rate) / scales.rate,
-        (cycle.level - (dynamics.com_w[2] - com_height))[:, None] / scales.level,
+        (cycle.level - (dynamics.com_w[2] - com_height * state.gait.body_height))[:, None] / scales.level,
         (cycle.heave - dynamics.com_velocity_w[2])[:, None] / scales.heave,
     )
     return np.hstack(columns)
@@ -182,7 +182,7 @@ def _parts(values: np.ndarray) -> np.ndarray:
 @lru_cache(maxsize=64)
 def _cycle(gait: Gait, swing: SwingRule, com_height: float) -> _Cycle:
     """The nominal cycle of a gait, equations (1) and (2)."""
-    duty, period = gait.duty, gait.period
+    duty, period = gait.duties, gait.period
     phase = np.arange(SAMPLES) / SAMPLES
     leg = gait.leg_phase(phase - LAG_S / period)
     stance = leg < duty
@@ -193,7 +193,7 @@ def _cycle(gait: Gait, swing: SwingRule, com_height: float) -> _Cycle:
     arc, rise = gait.swing_height * arc - swing.press * s**2, gait.swing_height * rise - 2 * swing.press * s
     above = arc > 0.0
     landed = 1.0 - min(np.sqrt(swing.press / gait.swing_height) / 4, 1.0)  # s at which the arc meets the ground
-    motion = nominal_motion(gait, _standing_inertia(), com_height - robot.FOOT_RADIUS)
+    motion = nominal_motion(gait, _standing_inertia(), com_height * gait.body_height - robot.FOOT_RADIUS)
     # The body's deviation when each foot came down: its stance began `leg` cycles ago.
     touchdown = motion.at((phase[:, None] - leg).ravel())[:, 3:5].reshape(SAMPLES, 4, 2)
     return _Cycle(
@@ -211,7 +211,7 @@ def _cycle(gait: Gait, swing: SwingRule, com_height: float) -> _Cycle:
     )
 
 
-def _contact_fraction(leg: np.ndarray, duty: float, waiting: float) -> np.ndarray:
+def _contact_fraction(leg: np.ndarray, duty: np.ndarray, waiting: np.ndarray) -> np.ndarray:
     """1 on the ground, 0 in the air, with ramps; the foot is down for `waiting` cycles before its stance begins."""
     since = np.mod(leg + waiting, 1.0)
     length = duty + waiting

@@ -19,6 +19,7 @@ _ALLOWED = {
     "duty": Limits(0.2, 0.95),
     "swing_height": Limits(0.01, 0.2, " [m]"),
     "stance_width": Limits(0.3, 1.5),
+    "body_height": Limits(0.6, 1.2),
 }
 
 
@@ -27,7 +28,7 @@ class Gait:
     """A periodic contact plan.
 
     The gait clock `phase` counts cycles; leg i is at (phase + offsets[i]) mod 1 of its own cycle, on the ground while
-    that is below `duty` and in the air for the rest.
+    that is below its `duties` and in the air for the rest.
 
     Attributes:
         name: what people call it.
@@ -36,6 +37,8 @@ class Gait:
         offsets: phase offset of each leg in cycles, order FL, FR, RL, RR.
         swing_height: clearance of a foot in the middle of its swing [m].
         stance_width: sideways distance of the footholds from the middle line, as a factor on the standing robot's.
+        body_height: mean height of the centre of mass, as a factor on the standing robot's.
+        duty_offsets: what each leg spends on the ground beyond `duty`, order FL, FR, RL, RR; negative for less.
 
     Raises:
         InvalidInputError: if a figure is outside its range.
@@ -47,6 +50,8 @@ class Gait:
     offsets: tuple[float, float, float, float]
     swing_height: float = 0.06
     stance_width: float = 1.0
+    body_height: float = 1.0
+    duty_offsets: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         """Check the numbers, and make them Python's."""
@@ -55,16 +60,31 @@ class Gait:
         check_numbers(self, _ALLOWED, suffix=f" of gait {self.name!r}")
         offsets = finite_vector(self.offsets, 4, f"offsets of gait {self.name!r}")
         object.__setattr__(self, "offsets", tuple(offsets.tolist()))  # a gait can be hashed and compared
+        more = finite_vector(self.duty_offsets, 4, f"duty_offsets of gait {self.name!r}")
+        object.__setattr__(self, "duty_offsets", tuple(more.tolist()))
+        low, high, _ = _ALLOWED["duty"]
+        if not ((self.duties >= low) & (self.duties <= high)).all():
+            raise InvalidInputError(
+                f"duty and duty_offsets of gait {self.name!r} must add up to {low:g} to {high:g} for every leg, got "
+                f"{self.duties.tolist()}"
+            )
+
+    @cached_property
+    def duties(self) -> np.ndarray:
+        """Share of its cycle that each leg spends on the ground, shape (4,), read-only."""
+        duties = self.duty + np.array(self.duty_offsets)
+        duties.flags.writeable = False
+        return duties
 
     @property
-    def stance_s(self) -> float:
-        """Time on the ground per cycle [s]."""
-        return self.duty * self.period
+    def stance_s(self) -> np.ndarray:
+        """Time of each leg on the ground per cycle [s], shape (4,)."""
+        return self.duties * self.period
 
     @property
-    def swing_s(self) -> float:
-        """Time in the air per cycle [s]."""
-        return (1.0 - self.duty) * self.period
+    def swing_s(self) -> np.ndarray:
+        """Time of each leg in the air per cycle [s], shape (4,)."""
+        return (1.0 - self.duties) * self.period
 
     @property
     def step_rate(self) -> float:
@@ -84,7 +104,7 @@ class Gait:
         body neither rises nor falls.
         """
         flies = not self.stance(np.linspace(0.0, 1.0, 200, endpoint=False)).any(axis=1).all()
-        return float((self.duty - self.leg_phase(0.0)).min() / 2) if flies and self.can_stand else None
+        return float((self.duties - self.leg_phase(0.0)).min() / 2) if flies and self.can_stand else None
 
     @property
     def nominal_feet_b(self) -> np.ndarray:
@@ -104,7 +124,7 @@ class Gait:
 
     def stance(self, phase: float | np.ndarray) -> np.ndarray:
         """Which legs should be on the ground; bool, shape of `phase` + (4,)."""
-        return self.leg_phase(phase) < self.duty
+        return self.leg_phase(phase) < self.duties
 
     def contact_schedule(self, phase: float, dt: float, steps: int) -> np.ndarray:
         """Share of each coming interval that a leg spends on the ground.
@@ -119,7 +139,7 @@ class Gait:
         """
         edges = phase + np.arange(steps + 1) * (dt / self.period)
         turns = edges[:, None] + self._offsets
-        ground = np.floor(turns) * self.duty + np.minimum(np.mod(turns, 1.0), self.duty)
+        ground = np.floor(turns) * self.duties + np.minimum(np.mod(turns, 1.0), self.duties)
         return np.clip(np.diff(ground, axis=0) / (dt / self.period), 0.0, 1.0)
 
 

@@ -14,7 +14,7 @@ def swing_middle(state: RobotState, hold_s: float) -> np.ndarray:
     """Time until the middle of what a hold contains of each leg's swing [s], shape (4,); its end if it has none."""
     gait = state.gait
     leg = gait.leg_phase(state.phase)
-    lift_off, touchdown = (gait.duty - leg) * gait.period, (1.0 - leg) * gait.period
+    lift_off, touchdown = (gait.duties - leg) * gait.period, (1.0 - leg) * gait.period
     # A leg in the air lifted off before the hold began, which counts as at its beginning.
     return (np.clip(lift_off, 0.0, hold_s) + np.minimum(touchdown, hold_s)) / 2
 
@@ -24,7 +24,7 @@ def contact_pieces(state: RobotState, hold_s: float) -> list[tuple[float, float]
     gait = state.gait
     leg = gait.leg_phase(state.phase)
     # Times to the next lift-off and touchdown of each leg.
-    edges = np.concatenate([(gait.duty - leg) % 1.0, 1.0 - leg]) * gait.period
+    edges = np.concatenate([(gait.duties - leg) % 1.0, 1.0 - leg]) * gait.period
     cuts = [0.0]
     for edge in sorted(edges[edges < hold_s - SHORTEST_PIECE_S].tolist()):
         if edge > cuts[-1] + SHORTEST_PIECE_S:

@@ -51,7 +51,8 @@ class FootholdRule:
             state.rpy[2],
             state.command,
             state.gait.nominal_feet_b,
-            (state.gait.stance_s / 2, float(self.velocity_gain), float(self.reach), robot.FOOT_RADIUS),
+            state.gait.stance_s / 2,
+            (float(self.velocity_gain), float(self.reach), robot.FOOT_RADIUS),
             touchdown_s.reshape(-1, 4),
         )
         return points.reshape(*touchdown_s.shape, 3)
@@ -93,11 +94,12 @@ def _plan(
     yaw: float,
     command: np.ndarray,
     feet_b: np.ndarray,
-    rule: tuple[float, float, float, float],
+    half_stance_s: np.ndarray,
+    rule: tuple[float, float, float],
     touchdown_s: np.ndarray,
 ) -> np.ndarray:
-    """`FootholdRule.plan` in complex numbers, x + iy. `rule`: half a stance, gain [s], reach and foot radius [m]."""
-    half_stance, gain, reach, radius = rule
+    """`FootholdRule.plan` in complex numbers, x + iy. `rule`: gain [s], reach and foot radius [m]."""
+    gain, reach, radius = rule
     heading = np.exp(1j * yaw)
     commanded = (command[0] + 1j * command[1]) * heading
     points = np.empty((len(touchdown_s), 4, 3))
@@ -107,7 +109,7 @@ def _plan(
             # From the centre of mass to the hip when the foot touches down: the body turns on meanwhile.
             arm = (feet_b[leg, 0] + 1j * feet_b[leg, 1]) * heading * np.exp(1j * command[2] * time)
             # i yaw_rate arm is what turning adds to the hip's velocity.
-            step = (velocity + 1j * command[2] * arm) * half_stance + gain * (velocity - commanded)
+            step = (velocity + 1j * command[2] * arm) * half_stance_s[leg] + gain * (velocity - commanded)
             step *= min(1.0, reach / max(abs(step), 1e-9))
             point = com + velocity * time + arm + step
             points[i, leg, 0], points[i, leg, 1], points[i, leg, 2] = point.real, point.imag, radius

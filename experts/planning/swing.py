@@ -60,10 +60,10 @@ class SwingRule:
         gait = state.gait
         leg = (gait.leg_phase(state.phase) + ahead_s / gait.period) % 1.0
         # In stance the swing to come counts as just begun: the answer is not used, but must be finite.
-        progress = np.maximum(leg - gait.duty, 0.0) / (1.0 - gait.duty)
+        progress = np.maximum(leg - gait.duties, 0.0) / (1.0 - gait.duties)
         remaining = (1.0 - progress) * gait.swing_s + ahead_s
         landing = footholds.plan(state, dynamics.com_w, velocity_w, remaining)
-        arc = gait.swing_height + state.foot_sink, self.press, self.early, gait.swing_s, gait.period, robot.FOOT_RADIUS
+        arc = gait.swing_height + state.foot_sink, self.press, self.early, gait.period, robot.FOOT_RADIUS
         return _track(
             progress,
             ahead_s,
@@ -73,6 +73,7 @@ class SwingRule:
             to_complex(dynamics.com_w),
             to_complex(velocity_w),
             float(state.command[2]),
+            gait.swing_s,
             tuple(map(float, arc)),
             (float(self.stiffness), float(self.damping)),
         )
@@ -102,6 +103,7 @@ def _track(
     com: complex,
     velocity: complex,
     yaw_rate: float,
+    swing_s: np.ndarray,
     arc: tuple[float, ...],
     gains: tuple[float, float],
 ) -> np.ndarray:
@@ -116,17 +118,18 @@ def _track(
         com: of the robot, horizontal, x + iy [m].
         velocity: of the body, horizontal, x + iy [m/s].
         yaw_rate: commanded [rad/s].
-        arc: height, press [m], early, swing time, period [s], foot radius [m].
+        swing_s: time of each leg in the air per cycle [s], shape (4,).
+        arc: height, press [m], early, period [s], foot radius [m].
         gains: stiffness [1/s^2], damping [1/s].
 
     Returns:
         World [m/s^2], shape (4, 3).
     """
-    height, press, early, swing_s, period, radius = arc
+    height, press, early, period, radius = arc
     stiffness, damping = gains
-    time = swing_s * (1.0 - early)
     acceleration = np.empty((4, 3))
     for leg in range(4):
+        time = swing_s[leg] * (1.0 - early)
         s = min(progress[leg] / (1.0 - early), 1.0)
         down = progress[leg] >= 1.0 - early
         left, rate, curvature = _cubic(s)

@@ -131,7 +131,7 @@ def test_stance_foot_goes_from_half_a_stride_before_to_half_behind():
     cycle = _cycle(gait, SWING, HEIGHT)
     leg = gait.leg_phase(np.arange(SAMPLES) / SAMPLES - LAG_S / gait.period)
     stance = leg < gait.duty
-    where = gait.stance_s / 2 - leg[stance] * gait.period - TRAIL_S
+    where = (gait.stance_s / 2 - leg * gait.period - TRAIL_S)[stance]
     np.testing.assert_allclose(cycle.place[stance], where, atol=1e-12)
     assert not cycle.speed[stance].any() and not cycle.climb[stance].any()
     np.testing.assert_array_equal(cycle.height[stance], robot.FOOT_RADIUS)

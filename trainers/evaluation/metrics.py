@@ -105,7 +105,7 @@ def touchdowns(contacts: np.ndarray, min_air: int | np.ndarray, skip: int) -> np
 
     Args:
         contacts: shape (n, 4), true on the ground.
-        min_air: samples in the air that make a flight, one number or one per sample; shorter gaps are bounces.
+        min_air: samples in the air that make a flight; shorter gaps are bounces. One number, or shape (n, 1) or (n, 4).
         skip: touchdowns before this sample do not count (the flight before one may begin earlier).
 
     Returns:
@@ -113,7 +113,7 @@ def touchdowns(contacts: np.ndarray, min_air: int | np.ndarray, skip: int) -> np
     """
     air = np.zeros(4, dtype=int)
     count = np.zeros(4, dtype=int)
-    flights = np.broadcast_to(min_air, len(contacts))
+    flights = np.broadcast_to(min_air, (len(contacts), 4))
     for i, on_ground in enumerate(np.asarray(contacts, dtype=bool)):
         count += on_ground & (air >= flights[i]) & (i >= skip)
         air = np.where(on_ground, 0, air + 1)

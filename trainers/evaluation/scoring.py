@@ -195,8 +195,8 @@ def score(
 
 
 def _min_air(series: Series, control_hz: float) -> np.ndarray:
-    """Samples in the air that make a flight, at every step, int, shape (n,)."""
-    swing_s = np.array([gait.swing_s for gait in series.gaits])
+    """Samples in the air that make a flight, at every step, int, shape (n, 4)."""
+    swing_s = np.array([gait.swing_s for gait in series.gaits]).reshape(-1, 4)
     return np.ceil(MIN_AIR_SHARE * swing_s * control_hz - 1e-9).astype(int)
 
 

@@ -88,7 +88,7 @@ def test_arc_leads_from_one_stride_behind_to_the_foothold(standing, model, gait)
     for s in (1e-9, 0.45, 0.9 - 1e-9):  # the last tenth of the swing is spent waiting on the ground
         phase = gait.duty + s * (1 - gait.duty) - gait.offsets[leg]
         state, dynamics = moving(standing, model, gait, 0.0, phase)
-        landing = rule.plan(state, dynamics.com_w, VELOCITY, np.full(4, (1 - s) * gait.swing_s))[leg]
+        landing = rule.plan(state, dynamics.com_w, VELOCITY, (1 - s) * gait.swing_s)[leg]
         position, velocity, _ = arc(state, dynamics)
         ends[s] = position[leg] - landing, velocity[leg]
     lift_off, middle, touchdown = ends.values()
@@ -97,7 +97,7 @@ def test_arc_leads_from_one_stride_behind_to_the_foothold(standing, model, gait)
     np.testing.assert_allclose(touchdown[0], [0, 0, -PRESS], atol=1e-6)
     assert middle[0][2] == pytest.approx(gait.swing_height - PRESS / 4)
     np.testing.assert_allclose(lift_off[1], 0, atol=1e-6)
-    np.testing.assert_allclose(touchdown[1], [0, 0, -2 * PRESS / (0.9 * gait.swing_s)], atol=1e-6)
+    np.testing.assert_allclose(touchdown[1], [0, 0, -2 * PRESS / (0.9 * gait.swing_s[leg])], atol=1e-6)
 
 
 @EVERY
@@ -105,7 +105,7 @@ def test_foot_waits_on_the_ground_at_the_end_of_the_swing(standing, model, gait)
     for s in (0.9 + 1e-9, 0.95, 1 - 1e-9):
         state, dynamics = moving(standing, model, gait, 0.0, gait.duty + s * (1 - gait.duty) - gait.offsets[0])
         position, velocity, forward = arc(state, dynamics)
-        landing = FootholdRule().plan(state, dynamics.com_w, VELOCITY, np.full(4, (1 - s) * gait.swing_s))[0]
+        landing = FootholdRule().plan(state, dynamics.com_w, VELOCITY, (1 - s) * gait.swing_s)[0]
         np.testing.assert_allclose(position[0], landing - [0, 0, PRESS], atol=1e-9)
         assert not velocity[0].any() and not forward[0].any()
 
@@ -118,7 +118,7 @@ def test_a_turning_body_swings_its_feet_along_a_circle(standing, model):
     on_ground = replace(dynamics, feet_w=np.zeros((4, 3)), feet_velocity_w=np.zeros((4, 3)))
     rules = (SwingRule(k, 0.0, PRESS, EARLY) for k in (0.0, 1.0))
     both = [rule.acceleration(state, ahead(0.0), on_ground, still, FootholdRule()) for rule in rules]
-    landing = FootholdRule().plan(state, dynamics.com_w, still, np.full(4, (1 - s) * gait.swing_s))[0]
+    landing = FootholdRule().plan(state, dynamics.com_w, still, (1 - s) * gait.swing_s)[0]
     arm = landing - dynamics.com_w
     stride = landing - (both[1] - both[0])[0]
     np.testing.assert_allclose(stride[:2], gait.period * np.array([-arm[1], arm[0]]), atol=1e-6)
