@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import trainers
-from go1_mtl_gym import TASKS
+from go1_mtl_gym import BUILT_IN_TASKS
 from go1_mtl_gym.env_config import EXPERT_ONLY
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.sim.physics_params import PhysicsParams
@@ -123,7 +123,7 @@ def with_expert(policies: Sequence[Agent]) -> list[Agent]:
     """
     shared, policies = [], policies or [shipped(STUDENT, "clocked")]
     for agent in policies:
-        kwargs = {"tasks": tuple(TASKS)} | agent.load().env_kwargs
+        kwargs = {"tasks": BUILT_IN_TASKS} | agent.load().env_kwargs
         shared.append({key: kwargs[key] for key in SHARED if key in kwargs})
     if any(kwargs != shared[0] for kwargs in shared):
         raise InvalidInputError(f"expected policies for the same {', '.join(SHARED)}, got {shared}")
@@ -133,4 +133,4 @@ def with_expert(policies: Sequence[Agent]) -> list[Agent]:
 def tasks_of(agent: Agent) -> tuple[str, ...]:
     """The gaits that an agent knows, in the order of its environment."""
     kwargs = agent.env_kwargs if agent.name == EXPERT else agent.load().env_kwargs
-    return tuple(kwargs.get("tasks") or TASKS)
+    return tuple(kwargs.get("tasks") or BUILT_IN_TASKS)

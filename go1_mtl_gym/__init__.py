@@ -1,7 +1,8 @@
 """Gymnasium environments of a Unitree Go1 quadruped with many gaits and a model predictive expert.
 
 Importing the package registers ``Go1Trot-v0``, ``Go1Bound-v0``, ``Go1Jump-v0``, ``Go1Walk-v0``, ``Go1Pace-v0``,
-``Go1Gallop-v0`` and ``Go1MultiGait-v0`` (a task drawn per episode); `register_task` adds your own.
+``Go1Gallop-v0``, ``Go1MultiGait-v0`` (a task drawn per episode) and ``Go1AnyGait-v0`` (a gait drawn per episode);
+`register_task` adds your own.
 ``gymnasium.make("go1_mtl_gym:Go1Trot-v0")`` imports and makes in one go.
 """
 
@@ -13,6 +14,8 @@ from go1_mtl_gym.actuation import PDGains
 from go1_mtl_gym.contract import PolicyContract
 from go1_mtl_gym.env_config import EnvConfig
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
+from go1_mtl_gym.gait_space import NAMED as NAMED_GAITS
+from go1_mtl_gym.gait_space import GaitSpace
 from go1_mtl_gym.gaits import GAITS, Gait
 from go1_mtl_gym.registration import env_id, register_built_in, register_task
 from go1_mtl_gym.rewards import RewardWeights
@@ -32,12 +35,14 @@ if TYPE_CHECKING:
 __all__ = [
     "GAITS",
     "BUILT_IN_TASKS",
+    "NAMED_GAITS",
     "PAPER_TASKS",
     "TASKS",
     "DomainRandomization",
     "EnvConfig",
     "EstimatorNoise",
     "Gait",
+    "GaitSpace",
     "Go1Env",
     "Go1Error",
     "InvalidInputError",

@@ -112,7 +112,7 @@ class PolicyContract:
     def of_environment(
         cls,
         layout: ObservationLayout,
-        gaits: Sequence[Gait],
+        gaits: Sequence[Gait | None],
         control_hz: float,
         gains: PDGains,
         action_map: ActionMap,
@@ -121,7 +121,7 @@ class PolicyContract:
 
         Args:
             layout: of its observations.
-            gaits: of the layout's tasks, in their order.
+            gaits: of the layout's tasks, in their order; None where it can be any.
             control_hz: steps per second.
             gains: of the actuators.
             action_map: from actions to joint targets.

@@ -18,7 +18,7 @@ from go1_mtl_gym.env_config import RENDER_MODES, EnvConfig
 from go1_mtl_gym.episode import Episode, begin_episode, how_it_ended
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.expert import Expert, make_expert
-from go1_mtl_gym.gaits import check_phase
+from go1_mtl_gym.gaits import Gait, check_phase
 from go1_mtl_gym.privileged import privileged_state
 from go1_mtl_gym.registration import register_task
 from go1_mtl_gym.rewards import no_reward
@@ -27,8 +27,11 @@ from go1_mtl_gym.sensing.state import RobotState
 from go1_mtl_gym.sensors import frame, measure, robot_state
 from go1_mtl_gym.sim.physics_params import PhysicsParams
 from go1_mtl_gym.sim.simulation import Simulation
-from go1_mtl_gym.tasks import TASKS, Task, check_reset_options
-from go1_mtl_gym.validation import finite_vector, one_of
+from go1_mtl_gym.tasks import ANY_GAIT, TASKS, Task, check_gait, check_reset_options
+from go1_mtl_gym.validation import finite_vector, number_in, one_of
+
+MAX_SLEW_S = 60.0
+"""For which a gait may be on its way to another one [s]."""
 
 
 class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
@@ -64,6 +67,7 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
     | 37 - 38 | phase          | -               | 1            | channel, by default; sine and cosine           |
     | 39 - 50 | last_action    | -               | 1            | channel, by default                            |
     | 51 - 74 | leg_kinematics | m, m/s          | 1, 40        | channel, by default; of the readings above     |
+    |         | gait           | mixed           |              | channel; clocks of the legs, figures of a gait |
     |         | history        | as above        | as above     | if `history` > 1: 34 numbers per older frame   |
     | 75 - 80 | task           | 0 or 1          | 0 ... 1      | always; one-hot, K = len(tasks)                |
 
@@ -82,8 +86,9 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
     after `episode_s`.
 
     ``info``: task, command, filtered_command, base_velocity (vx, vy, yaw rate in the heading frame), contacts, phase,
-    standing, reward_terms, fallen, ended ("", "fall", "unstable" or "time"). Keys, types and shapes are the same at
-    reset, where all reward terms are 0, as at step; so recorders and vector environments can stack them.
+    gait (`Gait.numbers`), standing, reward_terms, fallen, ended ("", "fall", "unstable" or "time"). Keys, types and
+    shapes are the same at reset, where all reward terms are 0, as at step; so recorders and vector environments can
+    stack them.
 
     ## Arguments
 
@@ -148,15 +153,17 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
 
         Args:
             seed: of everything random in this environment.
-            options: any of ``command`` (vx, vy, yaw rate; otherwise drawn from the task's range) and ``task`` (a name;
-                otherwise the environment's own, or a drawn one).
+            options: any of ``command`` (vx, vy, yaw rate; otherwise drawn from the task's range), ``task`` (a name;
+                otherwise the environment's own, or a drawn one) and, for the task "any_gait", ``gait`` (a `Gait`;
+                otherwise drawn).
 
         Raises:
-            InvalidInputError: for an unknown option, task or impossible command; the running episode is left as it is.
+            InvalidInputError: for an unknown option, task, gait or impossible command; the running episode is left as
+                it is.
         """
-        name, command = check_reset_options(options, self.tasks, self.config.task)
+        name, command, gait = check_reset_options(options, self.tasks, self.config.task)
         super().reset(seed=int(seed) if isinstance(seed, Integral) else seed)
-        self._episode = begin_episode(self.config, self._simulation, self.np_random, name, command)
+        self._episode = begin_episode(self.config, self._simulation, self.np_random, name, command, gait)
         state = self.state
         observation = self._observe(self._episode, state, self._simulation.read())
         if self._expert is not None:
@@ -193,7 +200,13 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
         """The observation that a reset or step has led to, once the episode has taken it in."""
         arriving = episode.sensor_faults.observe(reading)
         parts = measure(
-            arriving, state, episode.last_action, episode.sensor_noise, self.np_random, self.layout.channels
+            arriving,
+            state,
+            episode.last_action,
+            episode.sensor_noise,
+            self.np_random,
+            self.layout.channels,
+            self.control_s,
         )
         episode.remember(frame(parts))
         observation = self.layout.flatten(parts, episode.older_frames, self.tasks.index(episode.task.name))
@@ -225,7 +238,7 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
     @property
     def contract(self) -> PolicyContract:
         """What gives the numbers of observations and actions here their meaning."""
-        gaits = [TASKS[name].gait for name in self.tasks]
+        gaits = [None if name == ANY_GAIT else TASKS[name].gait for name in self.tasks]
         return PolicyContract.of_environment(self.layout, gaits, self.control_hz, self.gains, self.action_map)
 
     @property
@@ -304,9 +317,31 @@ class Go1Env(gymnasium.Env[np.ndarray, np.ndarray]):
                 is changed then.
         """
         episode = self._running("set_task")
-        new = TASKS[one_of(task, self.tasks, "task")]
+        new, asked = TASKS[one_of(task, self.tasks, "task")], episode.requested_task
+        if new.name == asked.name == ANY_GAIT:  # which goes on with the gait that it has
+            new = asked
         command = new.check_command(episode.command if command is None else command)
         episode.change_task(new, None if phase is None else check_phase(phase))
+        episode.change_command(command)
+
+    def set_gait(self, gait: Gait, slew_s: float = 0.0, command: ArrayLike | None = None) -> None:
+        """Change the gait while the task is "any_gait".
+
+        Args:
+            gait: the new one, whether or not it lies in the space that gaits are drawn from.
+            slew_s: how long the present gait takes to become it, figure by figure [s]; with 0 it begins at once, at the
+                phase that is nearest to where the feet are.
+            command: that is asked for from now on, as in `set_command`; None: the present one goes on.
+
+        Raises:
+            InvalidInputError: if it is no gait, another task is asked for, or the command is impossible; nothing is
+                changed then.
+        """
+        episode = self._running("set_gait")
+        check_gait(gait, episode.requested_task.name)
+        slew_s = number_in(slew_s, 0.0, MAX_SLEW_S, "slew_s [s]")
+        command = episode.requested_task.check_command(episode.command if command is None else command)
+        episode.change_gait(gait, slew_s)
         episode.change_command(command)
 
     def set_command(self, command: ArrayLike) -> None:

@@ -8,20 +8,24 @@ from typing import Any
 from go1_mtl_gym.actuation import PHYSICS_HZ, PDGains
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.expert import DEFAULT_EXPERT, check_expert
+from go1_mtl_gym.gait_space import GaitSpace
 from go1_mtl_gym.sensing.observation import ObservationLayout, SensorNoise
 from go1_mtl_gym.sensing.sensor_faults import SensorParams
 from go1_mtl_gym.sensing.state_estimator import StateEstimatorConfig
 from go1_mtl_gym.sensing.state_noise import EstimatorNoise
 from go1_mtl_gym.sim.domain_randomization import SETTLE_S, DomainRandomization
 from go1_mtl_gym.sim.physics_params import PhysicsParams
-from go1_mtl_gym.tasks import BUILT_IN_TASKS, check_task_names
+from go1_mtl_gym.tasks import ANY_GAIT, BUILT_IN_TASKS, check_task_names
 from go1_mtl_gym.validation import integer_in, number_in, one_of, parameters_of, switch, yes_or_no
 
 DEFAULT_TASKS = BUILT_IN_TASKS
 """What an environment knows unless told otherwise, besides its own task: the tasks of the policy in the package."""
 DEFAULT_CHANNELS = ("command", "phase", "last_action", "leg_kinematics")
-DEFAULT_HISTORY = 3
 """What an environment shows unless told otherwise: the channels that the policy in the package sees."""
+ANY_GAIT_CHANNELS = ("command", "last_action", "leg_kinematics", "gait")
+"""The same where the gait can be any."""
+DEFAULT_HISTORY = 3
+"""Frames that an environment shows unless told otherwise."""
 RENDER_MODES = ("human", "rgb_array")
 PIXELS = (16, 4096)
 """Smallest and largest width and height of a picture [pixels]."""
@@ -32,6 +36,7 @@ _SWITCHES: Mapping[str, type] = {
     "estimator_noise": EstimatorNoise,
     "state_estimator": StateEstimatorConfig,
     "randomization": DomainRandomization,
+    "gaits": GaitSpace,
 }
 
 
@@ -46,7 +51,8 @@ class EnvConfig:
         task: name of the task, or None to draw one per episode.
         tasks: names of the tasks in the one-hot id, in order; None means `DEFAULT_TASKS` and, if it is none of them,
             `task` at the end.
-        channels: optional parts of the observation, from `go1_mtl_gym.sensing.observation.CHANNELS`, in that order.
+        channels: optional parts of the observation, from `go1_mtl_gym.sensing.observation.CHANNELS`, in that order;
+            None means `DEFAULT_CHANNELS`, and for the task "any_gait" `ANY_GAIT_CHANNELS`.
         history: number of proprioceptive frames in the observation, 1 ... 50.
         control_hz: rate of `step` [Hz]; a divisor of 1000 from 50 to 1000.
         kp: stiffness of the actuators [N m/rad].
@@ -65,6 +71,8 @@ class EnvConfig:
         sensors: faults of the readings that are observed; the expert's state has none.
         settle_s: time for which the robot stands before the episode begins [s], rounded to milliseconds: under
             action 0, until joints and feet have given way.
+        gaits: the `GaitSpace` that the task "any_gait" draws from; likewise, and the default one where that task is
+            known.
         robot: path of an MJCF file of another Go1, or None for ours; the experts go on thinking of ours.
 
     Raises:
@@ -73,7 +81,7 @@ class EnvConfig:
 
     task: str | None = "trot"
     tasks: tuple[str, ...] = None  # type: ignore[assignment]  # None never stays
-    channels: tuple[str, ...] = DEFAULT_CHANNELS
+    channels: tuple[str, ...] = None  # type: ignore[assignment]  # likewise
     history: int = DEFAULT_HISTORY
     control_hz: int = 50
     kp: float = 50.0
@@ -91,12 +99,14 @@ class EnvConfig:
     sensors: SensorParams = field(default_factory=SensorParams)
     settle_s: float = 0.0
     privileged: bool = False
+    gaits: GaitSpace | None = None
     robot: str | None = None
 
     def __post_init__(self) -> None:
         """Check everything, and bring it into its one form."""
         tasks = check_task_names(default_tasks(self.task) if self.tasks is None else self.tasks)
-        layout = ObservationLayout(tasks, self.channels, self.history)
+        channels = ANY_GAIT_CHANNELS if self.task == ANY_GAIT else DEFAULT_CHANNELS
+        layout = ObservationLayout(tasks, channels if self.channels is None else self.channels, self.history)
         control_hz = check_control_hz(self.control_hz)
         gains = PDGains(self.kp, self.kd)
         self._set(
@@ -119,6 +129,8 @@ class EnvConfig:
             privileged=yes_or_no(self.privileged, "privileged"),
             robot=_path(self.robot),
         )
+        if ANY_GAIT in tasks and self.gaits is None:
+            self._set(gaits=GaitSpace())
         self._check_together()
 
     def _set(self, **values: object) -> None:
@@ -136,6 +148,8 @@ class EnvConfig:
                 "a privileged expert is told what a state_estimator has to find out: give one of them, got "
                 f"{self.state_estimator}"
             )
+        if self.gaits is not None and ANY_GAIT not in self.tasks:
+            raise InvalidInputError(f"gaits are drawn for the task {ANY_GAIT!r}, which is not among {self.tasks}")
         if self.randomization is not None and self.randomization.noise is not None:
             self.scaled_noise(self.randomization.noise[1])  # refuses what could be drawn
 
@@ -226,6 +240,8 @@ def default_tasks(task: object) -> tuple[str, ...]:
     Args:
         task: its own, or None.
     """
+    if task == ANY_GAIT:
+        return (ANY_GAIT,)
     return DEFAULT_TASKS if task is None or task in DEFAULT_TASKS else (*DEFAULT_TASKS, str(task))
 
 

@@ -12,7 +12,8 @@ from go1_mtl_gym import robot
 from go1_mtl_gym.actuation import PHYSICS_HZ
 from go1_mtl_gym.env_config import EnvConfig
 from go1_mtl_gym.gait_change import GaitChange
-from go1_mtl_gym.gaits import next_phase
+from go1_mtl_gym.gait_slew import GaitSlew, fitting_phase
+from go1_mtl_gym.gaits import Gait, is_standing, next_phase
 from go1_mtl_gym.rewards import no_reward, reward_terms
 from go1_mtl_gym.sensing.observation import SensorNoise
 from go1_mtl_gym.sensing.sensor_faults import SensorFaults
@@ -22,7 +23,7 @@ from go1_mtl_gym.sensing.state_noise import EstimatorError
 from go1_mtl_gym.sensing.state_source import StateSource, TrueState
 from go1_mtl_gym.sim.domain_randomization import EpisodeConditions
 from go1_mtl_gym.sim.simulation import Simulation
-from go1_mtl_gym.tasks import TASKS, Task
+from go1_mtl_gym.tasks import ANY_GAIT, TASKS, Task, any_gait_task
 
 COMMAND_FILTER_S = 0.2
 """Time constant of the low-pass between a command and what expert and student see of it [s]."""
@@ -72,6 +73,7 @@ class Episode:
         time_s: since the reset [s].
         gait_change: that waits until the present gait can be left, or None.
         task_since_s: since when the present task goes on [s], if it was begun as soon as the one before could be left.
+        gait_slew: by which the gait of the task "any_gait" becomes another one, or None.
     """
 
     task: Task
@@ -87,6 +89,7 @@ class Episode:
     time_s: float = 0.0
     gait_change: GaitChange | None = None
     task_since_s: float = -np.inf
+    gait_slew: GaitSlew | None = None
 
     @property
     def requested_task(self) -> Task:
@@ -118,6 +121,9 @@ class Episode:
         self.phase = next_phase(self.task.gait, before, self.filtered_command, seconds)
         if change is not None and change.begins_after(before, self.phase, self.filtered_command, time_s):
             self._begin(change.wanted, 0.0, time_s)
+        if self.gait_slew is not None:
+            self.task = any_gait_task(self.gait_slew.at(time_s))
+            self.gait_slew = None if self.gait_slew.is_over(time_s) else self.gait_slew
         followed = self.command if self.gait_change is None else self.gait_change.slowed(self.command)
         self.filtered_command = filtered(followed, self.filtered_command, seconds)
 
@@ -171,8 +177,24 @@ class Episode:
         if self.gait_change is not None and self.gait_change.begins_at_once(self.filtered_command, self.time_s):
             self._begin(task, 0.0, self.time_s)
 
+    def change_gait(self, gait: Gait, slew_s: float) -> None:
+        """Change the gait of the task "any_gait".
+
+        Args:
+            gait: the new one.
+            slew_s: how long the old one takes to become it [s]; with 0 it begins at once, at the phase that fits best,
+                or at rest if it can rest where the old one does.
+        """
+        if slew_s > 0:
+            self.gait_slew = GaitSlew(self.task.gait, gait, self.time_s, slew_s)
+            return
+        resting = is_standing(self.task.gait, self.phase, self.filtered_command) and gait.can_stand
+        phase = 0.0 if resting else fitting_phase(self.task.gait, self.phase, gait)
+        self._begin(any_gait_task(gait), phase, -np.inf)
+
     def _begin(self, task: Task, phase: float, since_s: float) -> None:
         self.task, self.phase, self.gait_change, self.task_since_s = task, phase, None, since_s
+        self.gait_slew = None
 
     # -- Its reports ---------------------------------------------------------------------------------------------------
 
@@ -204,6 +226,7 @@ class Episode:
             "base_velocity": np.nan_to_num(state.base_velocity),
             "contacts": state.contacts.copy(),
             "phase": self.phase,
+            "gait": self.task.gait.numbers,
             "standing": state.standing,
             "reward_terms": terms,
             "fallen": ended in ("fall", "unstable"),
@@ -220,6 +243,7 @@ def begin_episode(
     rng: np.random.Generator,
     task: str | None = None,
     command: np.ndarray | None = None,
+    gait: Gait | None = None,
 ) -> Episode:
     """Stand the robot up, let it settle, and begin an episode there.
 
@@ -230,8 +254,12 @@ def begin_episode(
             noise, one for encoder offsets and one for the randomization, if there are any.
         task: name of the task; None draws one.
         command: (vx [m/s], vy [m/s], yaw rate [rad/s]), shape (3,); None takes the one that is drawn.
+        gait: of the task "any_gait"; None draws one, from a generator of its own.
     """
     chosen = TASKS[task or str(rng.choice(config.tasks))]
+    if chosen.name == ANY_GAIT and config.gaits is not None:
+        drawn_gait = config.gaits.draw(_stream(rng))
+        chosen = any_gait_task(drawn_gait if gait is None else gait)
     drawn = chosen.draw_command(rng)
     joint_noise = rng.uniform(-RESET_JOINT_NOISE, RESET_JOINT_NOISE, len(robot.JOINTS))
     source, conditions = _state_source(config, rng), _conditions(config, rng)

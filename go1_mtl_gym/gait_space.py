@@ -1,6 +1,6 @@
 """Gaits as a space: bounds, draws, names of the textbook gaits in it, neighbors and mirror images."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -16,6 +16,9 @@ GRID = 400
 """Phases at which a cycle is looked at."""
 Span = tuple[float, float]
 """Smallest and largest value."""
+SPANS = ("period", "duty", "swing_height", "stance_width", "body_height")
+"""Figures of a gait that a space bounds."""
+_MIDDLE: dict[str, Any] = {"period": 0.4, "duty": 0.5, "offsets": (0.0, 0.0, 0.0, 0.0)}
 
 
 def standing_at_zero(gait: Gait) -> Gait:
@@ -102,7 +105,7 @@ class GaitSpace:
                 raise InvalidInputError(f"{name} of a GaitSpace must be (smallest, largest), got {(low, high)}")
             object.__setattr__(self, name, (float(low), float(high)))
             for value in (low, high):
-                Gait("bound of a GaitSpace", **(dict(_MIDDLE) | {name: float(value)}))  # refuses what no gait can have
+                Gait("bound of a GaitSpace", **(_MIDDLE | {name: float(value)}))  # refuses what no gait can have
         number_in(self.duty_offset, 0.0, 0.5, "duty_offset of a GaitSpace")
         number_in(self.pattern_spread, 0.0, 1.0, "pattern_spread of a GaitSpace [cycles]")
         for name in ("patterns", "uneven"):
@@ -139,12 +142,6 @@ class GaitSpace:
     def spans(self) -> dict[str, Span]:
         """Bounds by the names of a gait's figures."""
         return {name: getattr(self, name) for name in SPANS}
-
-
-SPANS = ("period", "duty", "swing_height", "stance_width", "body_height")
-"""Figures of a gait that a space bounds."""
-_MIDDLE = {"period": 0.4, "duty": 0.5, "offsets": (0.0, 0.0, 0.0, 0.0)}
-assert {*SPANS} < {each.name for each in fields(GaitSpace)}
 
 
 def mirrored(gait: Gait) -> Gait:

@@ -114,6 +114,13 @@ class Gait:
         """
         return _nominal_feet_b(self.stance_width)
 
+    @property
+    def numbers(self) -> np.ndarray:
+        """Period, duty of each leg, offsets, swing height, stance width and body height in a row, shape (12,)."""
+        return np.array(
+            [self.period, *self.duties, *self.offsets, self.swing_height, self.stance_width, self.body_height]
+        )
+
     @cached_property
     def _offsets(self) -> np.ndarray:
         return np.array(self.offsets)
@@ -141,6 +148,19 @@ class Gait:
         turns = edges[:, None] + self._offsets
         ground = np.floor(turns) * self.duties + np.minimum(np.mod(turns, 1.0), self.duties)
         return np.clip(np.diff(ground, axis=0) / (dt / self.period), 0.0, 1.0)
+
+
+def gait_of(numbers: np.ndarray, name: str) -> Gait:
+    """The gait that has these `Gait.numbers`, shape (12,), up to rounding.
+
+    Raises:
+        InvalidInputError: if there is none.
+    """
+    period, *legs, swing_height, stance_width, body_height = finite_vector(numbers, 12, "numbers of a gait").tolist()
+    duties = np.array(legs[:4])
+    duty = float(duties.mean())
+    more = tuple((duties - duty).tolist())
+    return Gait(name, period, duty, tuple(legs[4:]), swing_height, stance_width, body_height, more)
 
 
 @lru_cache(maxsize=64)

@@ -6,6 +6,7 @@ import numpy as np
 
 from go1_mtl_gym.gaits import Gait
 from go1_mtl_gym.kinematics import leg_kinematics
+from go1_mtl_gym.sensing.gait_numbers import gait_numbers
 from go1_mtl_gym.sensing.observation import PROPRIOCEPTION, SensorNoise
 from go1_mtl_gym.sensing.sensor_faults import Reading
 from go1_mtl_gym.sensing.state import RobotState
@@ -45,6 +46,7 @@ def measure(
     noise: SensorNoise | None,
     rng: np.random.Generator,
     channels: Container[str],
+    control_s: float,
 ) -> dict[str, np.ndarray]:
     """Every part of an observation by name, now; finite even if the physics diverged.
 
@@ -56,6 +58,7 @@ def measure(
         rng: that the noise is drawn from.
         channels: that are shown; what costs time and is not among them is left out. Noise is drawn for all others, so
             that it is the same whichever are shown.
+        control_s: the control period [s].
     """
     turn = 2 * np.pi * state.phase
     parts = {
@@ -73,6 +76,8 @@ def measure(
         noise.apply(parts, rng)
     if "leg_kinematics" in channels:
         parts["leg_kinematics"] = leg_kinematics(parts["q"], parts["dq"], parts["gyroscope"])
+    if "gait" in channels:
+        parts["gait"] = gait_numbers(state.gait, state.phase, state.standing, control_s)
     if np.isfinite(sum(float(part.sum()) for part in parts.values())):
         return parts
     return {name: np.nan_to_num(part) for name, part in parts.items()}

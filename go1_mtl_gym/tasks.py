@@ -8,6 +8,7 @@ from types import MappingProxyType
 import numpy as np
 
 from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.gait_space import NAMED
 from go1_mtl_gym.gaits import GAITS, Gait
 from go1_mtl_gym.rewards import RewardWeights
 from go1_mtl_gym.validation import finite_vector, one_of
@@ -149,6 +150,28 @@ BUILT_IN_TASKS = tuple(_REGISTRY)
 """The tasks that come with the package, in head order: what the main job teaches unless told otherwise."""
 PAPER_TASKS = ("trot", "bound", "jump", "walk")
 """The gaits of arXiv 2505.08574, in head order."""
+ANY_GAIT = "any_gait"
+"""The task whose gait is drawn from a `GaitSpace` in every episode, and can be changed to any other."""
+STRIDE = 0.28
+"""How far a foot goes back under the body in its stance at the largest speed that is drawn for a gait [m]."""
+
+
+def any_gait_task(gait: Gait) -> Task:
+    """The task `ANY_GAIT` with a gait.
+
+    A leg can reach only so far, so the speed that is asked for follows from how long the feet stay on the ground.
+    """
+    forward = float(np.clip(STRIDE / gait.stance_s.max(), 0.3, 1.2))
+    return Task(
+        ANY_GAIT,
+        gait,
+        command_range=(forward, 0.4 * forward, 0.8),
+        command_limit=(2.0, 1.0, 2.0),
+        push_limit=(1.0, 1.0, 0.8),
+    )
+
+
+_REGISTRY[ANY_GAIT] = any_gait_task(NAMED["trot"])
 _NAME = re.compile(r"[a-z][a-z0-9]*(_[a-z][a-z0-9]*)*")
 
 
@@ -189,8 +212,8 @@ def check_task_names(names: object) -> tuple[str, ...]:
 
 def check_reset_options(
     options: object, tasks: tuple[str, ...], default_task: str | None
-) -> tuple[str | None, np.ndarray | None]:
-    """Return the task's name (None: draw one) and the command (None: draw one) that an episode was asked to have.
+) -> tuple[str | None, np.ndarray | None, Gait | None]:
+    """Return task's name, command and gait that an episode was asked to have; None: draw one.
 
     Args:
         options: what an environment's `reset` was given.
@@ -198,16 +221,35 @@ def check_reset_options(
         default_task: the environment's own, or None.
 
     Raises:
-        InvalidInputError: for an unknown option, task or impossible command.
+        InvalidInputError: for an unknown option, task or impossible command, or a gait for a task that has its own.
     """
     if not (options is None or isinstance(options, Mapping)):
         raise InvalidInputError(f'reset options must be a dictionary such as {{"task": "trot"}}, got {options!r}')
     given = dict(options or {})
     for name in given:
-        one_of(name, ("command", "task"), "reset option")
-    task, command = given.get("task"), given.get("command")
+        one_of(name, ("command", "gait", "task"), "reset option")
+    task, command, gait = given.get("task"), given.get("command"), given.get("gait")
     task = default_task if task is None else one_of(task, tasks, "task")
+    if gait is not None:
+        check_gait(gait, task)
     if command is not None:
         for name in tasks if task is None else (task,):  # whichever is drawn must allow it
             command = TASKS[name].check_command(command)
-    return task, command
+    return task, command, gait
+
+
+def check_gait(gait: object, task: str | None) -> Gait:
+    """Return a gait that a task may be given.
+
+    Args:
+        gait: that was asked for.
+        task: name of the task; None if one is to be drawn.
+
+    Raises:
+        InvalidInputError: if it is no gait, or the task has its own.
+    """
+    if not isinstance(gait, Gait):
+        raise InvalidInputError(f"a Gait was expected, got {gait!r}")
+    if task != ANY_GAIT:
+        raise InvalidInputError(f"a gait can be chosen where the task is {ANY_GAIT!r}; here it is {task!r}")
+    return gait

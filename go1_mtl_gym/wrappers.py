@@ -8,11 +8,13 @@ import numpy as np
 from go1_mtl_gym.deprecation import renamed_arguments
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.seeded_wrapper import SeededWrapper
-from go1_mtl_gym.tasks import TASKS, Task
+from go1_mtl_gym.tasks import ANY_GAIT, TASKS, Task, any_gait_task
 from go1_mtl_gym.validation import finite_vector, interval_s, number_in
 
 NOISE_CORRELATION_S = 0.1
 """Correlation time of the action noise [s]."""
+GAIT_SLEW_S = (0.0, 1.0)
+"""For which a gait is on its way to the next one where any gait can be [s]."""
 
 
 @renamed_arguments(kick="push", kick_interval="push_interval", corner_share="corner_fraction")
@@ -23,8 +25,8 @@ class PerturbationWrapper(SeededWrapper):
     first-order autoregressive noise on the executed action, its standard deviation drawn per episode from
     U(0, `noise_rad`); horizontal pushes of the trunk's velocity, uniform in a disc of radius `push`, at exponentially
     distributed times; commands redrawn from the task's range; and changes to another of the environment's tasks, which
-    begin as `Go1Env.set_task` says. `expert_action` is untouched: it answers for the true state, so the labels are
-    clean.
+    begin as `Go1Env.set_task` says, or to another gait where any can be.
+    `expert_action` is untouched: it answers for the true state, so the labels are clean.
 
     Args:
         env: a `Go1Env`, wrapped or not.
@@ -61,7 +63,7 @@ class PerturbationWrapper(SeededWrapper):
         self._command_interval = interval_s(command_interval, "command_interval")
         self._corner_fraction = number_in(corner_fraction, 0.0, 1.0, "corner_fraction")
         self._task_interval = interval_s(task_interval, "task_interval")
-        if task_interval is not None and len(self._go1.tasks) < 2:
+        if task_interval is not None and len(self._go1.tasks) < 2 and self._go1.tasks != (ANY_GAIT,):
             raise InvalidInputError(f"task_interval must be None for an environment of one task, got {task_interval}")
 
     def reset(
@@ -103,12 +105,23 @@ class PerturbationWrapper(SeededWrapper):
         return observation, float(reward), terminated, truncated, info | {"executed_action": executed}
 
     def _change_task(self) -> None:
-        """Ask for another task than the one that was asked for last."""
+        """Ask for another task than the one that was asked for last; where any gait can be, for another gait."""
         env = self._go1
+        if env.tasks == (ANY_GAIT,):
+            self._change_gait()
+            return
         name = str(self._rng.choice([name for name in env.tasks if name != env.requested_task.name]))
         span = np.array(TASKS[name].command_range)
         env.set_command(np.clip(env.command, -span, span))
         env.set_task(name)
+
+    def _change_gait(self) -> None:
+        """Ask for another gait, at once or bit by bit."""
+        env, gaits = self._go1, self._go1.config.gaits
+        assert gaits is not None  # wherever the task is known
+        gait, slew_s = gaits.draw(self._rng), float(self._rng.uniform(*GAIT_SLEW_S))
+        span = np.array(any_gait_task(gait).command_range)
+        env.set_gait(gait, slew_s, np.clip(env.command, -span, span))
 
     def _draw_command(self, task: Task) -> np.ndarray:
         if self._corner_fraction > 0 and self._rng.uniform() < self._corner_fraction:

@@ -8,6 +8,7 @@ from pathlib import Path
 from experiments.catalog import STUDIES, study_class, summary_line
 from experiments.results import Results
 from go1_mtl_gym import (
+    BUILT_IN_TASKS,
     TASKS,
     DomainRandomization,
     EnvConfig,
@@ -39,6 +40,8 @@ CONTENT = {
     "phase": "sine and cosine of the gait clock",
     "last_action": "the action of the last step",
     "leg_kinematics": "feet, 4 x 3, and what each says of the trunk's velocity if it stands still, 4 x 3; trunk frame",
+    "gait": "of each leg sine and cosine of its clock, times to touchdown and lift-off [s], share of the next control "
+    "period on the ground, duty; of the gait cycles per second, swing height [m], stance width, body height; standing",
     "history": "the first 34 numbers of the frames before this one, newest first",
     "task": "one-hot task id, in the order of `tasks`",
 }
@@ -99,7 +102,7 @@ def gaits() -> str:
     """Contact plan of every task that comes with the package."""
     header = ("gait", "id", "period [s]", "duty", "offsets FL FR RL RR", "steps/s", "swing [m]", "stands")
     rows = []
-    for task in TASKS.values():
+    for task in (TASKS[name] for name in BUILT_IN_TASKS):
         gait = task.gait
         rows.append(
             (
@@ -121,7 +124,10 @@ def commands() -> str:
     header = ("gait", "range: vx", "vy [m/s]", "yaw rate [rad/s]", "accepted: vx", "vy [m/s]", "yaw rate [rad/s]")
     return markdown(
         header,
-        [(task.name, *(f"± {x:g}" for x in (*task.command_range, *task.command_limit))) for task in TASKS.values()],
+        [
+            (task.name, *(f"± {x:g}" for x in (*task.command_range, *task.command_limit)))
+            for task in (TASKS[name] for name in BUILT_IN_TASKS)
+        ],
     )
 
 

@@ -13,7 +13,7 @@ import experts
 import trainers
 from experiments.agents import EXPERT, Agent
 from experiments.study import Cell, Metrics, Study, option
-from go1_mtl_gym import TASKS
+from go1_mtl_gym import BUILT_IN_TASKS, TASKS
 from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.robot import HOME_POSE
 from go1_mtl_gym.sensing.state import RobotState
@@ -165,7 +165,7 @@ def shared_range(*tasks: str) -> np.ndarray:
 class ExpertOptions:
     """What all studies of the expert share."""
 
-    tasks: tuple[str, ...] = option(tuple(TASKS), "the gaits")
+    tasks: tuple[str, ...] = option(BUILT_IN_TASKS, "the gaits")
     control_hz: int = option(50, "rate of the expert and of the joint targets [Hz]")
 
 

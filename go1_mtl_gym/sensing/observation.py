@@ -12,6 +12,7 @@
 | phase         | 2    | -       | channel      | sine and cosine of the gait clock                                  |
 | last_action   | 12   | -       | channel      | the action applied during the last step                            |
 | leg_kinematics | 24  | m, m/s | channel      | feet, 4 x 3, and what each says of the trunk's velocity, 4 x 3     |
+| gait          | 29   | mixed   | channel      | clocks of the legs and the figures of the gait, `gait_numbers`      |
 | history       | 34 (n - 1) | as above | history = n | the n - 1 proprioceptive frames before this one, newest first |
 | task          | K    | 0 or 1  | yes          | one-hot task id, in the order of the environment's `tasks`         |
 """
@@ -28,7 +29,9 @@ from go1_mtl_gym.validation import Limits, check_numbers, integer_in, one_of
 
 PROPRIOCEPTION = MappingProxyType({"accelerometer": 3, "gyroscope": 3, "q": 12, "dq": 12, "contacts": 4})
 """Sizes of the raw proprioceptive parts; together the 34 numbers of arXiv 2505.08574."""
-CHANNELS = MappingProxyType({"command": 3, "gravity": 3, "phase": 2, "last_action": 12, "leg_kinematics": 24})
+CHANNELS = MappingProxyType(
+    {"command": 3, "gravity": 3, "phase": 2, "last_action": 12, "leg_kinematics": 24, "gait": 29}
+)
 """Sizes of the parts that are there when asked for."""
 UNITS = MappingProxyType(
     {
@@ -38,6 +41,7 @@ UNITS = MappingProxyType(
         "dq": "rad/s",
         "command": "m/s, m/s, rad/s",
         "leg_kinematics": "m, m/s",
+        "gait": "-, s, s, -, -, Hz, m, -, -, -",
     }
 )
 """Units of the parts that have one."""
@@ -53,6 +57,7 @@ _BOUND = {
     "phase": np.ones(2),
     "last_action": np.ones(12),
     "leg_kinematics": np.repeat([1.0, 40.0], 12),
+    "gait": np.concatenate([np.ones(8), np.full(8, 3.0), np.ones(8), [7.0, 0.2, 1.5, 1.2, 1.0]]),
 }
 
 

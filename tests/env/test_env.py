@@ -11,7 +11,7 @@ from go1_mtl_gym import BUILT_IN_TASKS, PAPER_TASKS, TASKS, InvalidInputError, P
 from go1_mtl_gym.env import Go1Env
 
 INFO = {
-    "task", "command", "filtered_command", "base_velocity", "contacts", "phase", "standing", "reward_terms",
+    "task", "command", "filtered_command", "base_velocity", "contacts", "phase", "gait", "standing", "reward_terms",
     "fallen", "ended",
 }  # fmt: skip
 
@@ -32,10 +32,10 @@ def test_every_id_is_registered_with_and_without_the_module(task):
         assert env.observation_space.contains(observation)
 
 
-@pytest.mark.parametrize("task", [None, *TASKS])
+@pytest.mark.parametrize("task", [None, *BUILT_IN_TASKS])
 def test_without_arguments_it_is_the_environment_of_the_policy_in_the_package(task):
     env = gymnasium.make(env_id(task)).unwrapped
-    drives = BUILT_IN_TASKS if task in (None, *BUILT_IN_TASKS) else (*BUILT_IN_TASKS, task)
+    drives = BUILT_IN_TASKS
     assert env.tasks == drives and env.layout.channels == ("command", "phase", "last_action", "leg_kinematics")
     assert env.observation_space.shape == (34 + 3 + 2 + 12 + 24 + 2 * 34 + len(drives),)
     assert (env.control_hz, env.gains, env.config.history) == (50, PDGains(50.0, 2.0), 3)

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from go1_mtl_gym import GAITS, TASKS, InvalidInputError, robot
+from go1_mtl_gym import BUILT_IN_TASKS, GAITS, InvalidInputError, robot
 from go1_mtl_gym.env import Go1Env
 from go1_mtl_gym.episode import COMMAND_SLEW, filtered
 from go1_mtl_gym.gaits import STAND_COMMAND
@@ -56,7 +56,7 @@ def test_a_stand_ends_with_the_command_and_begins_at_a_whole_cycle():
 
 
 @pytest.mark.parametrize("control_hz", [50, 200, 1000])
-@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize("task", BUILT_IN_TASKS)
 def test_only_gaits_that_can_stand_do(task, control_hz):
     env = Go1Env(task, control_hz=control_hz)
     env.reset(seed=0, options={"command": (0.0, 0.0, 0.0)})

@@ -17,7 +17,11 @@ ALL = tuple(CHANNELS)
 
 def parts(rng: np.random.Generator) -> dict[str, np.ndarray]:
     """Random values within the bounds for every part."""
-    return {name: rng.uniform(0, 1, size) for name, size in (PROPRIOCEPTION | CHANNELS).items()}
+    layout = ObservationLayout(TASKS, ALL)
+    sizes = PROPRIOCEPTION | CHANNELS
+    return {
+        name: rng.uniform(0, 1, size) * layout.high[layout.slices[name]].clip(max=1) for name, size in sizes.items()
+    }
 
 
 def test_default_is_the_papers_34_numbers_and_the_task():

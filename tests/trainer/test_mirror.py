@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 import trainers
-from go1_mtl_gym import TASKS, Gait, InvalidInputError
+from go1_mtl_gym import NAMED_GAITS, TASKS, Gait, InvalidInputError
+from go1_mtl_gym.gait_space import mirrored as mirrored_gait
+from go1_mtl_gym.gaits import gait_of
 from go1_mtl_gym.kinematics import leg_kinematics
-from trainers.data.mirror import mirror_shift, mirrored, with_mirrored
+from go1_mtl_gym.sensing.gait_numbers import gait_numbers
+from trainers.data.mirror import _mirrored_gait, mirror_shift, mirrored, with_mirrored
 from trainers.data.operator import OperatorConfig
 
 CHANNELS = ("command", "gravity", "phase", "last_action", "leg_kinematics")
@@ -116,3 +119,24 @@ def test_cloning_learns_from_images_too(rows):
     image = mirrored(rows)
     errors = [np.abs(policy.predict(image.obs, deterministic=True)[0] - image.acts).mean() for policy in policies]
     assert errors[1] < 0.8 * errors[0]
+
+
+def test_rows_of_any_gait_are_those_of_the_mirrored_gait():
+    rows = trainers.collect("any_gait", seed=5, seconds=1.0)
+    image, where = mirrored(rows), rows.contract.slices["gait"]
+    assert len(image) == len(rows)
+    assert mirrored(image).obs == pytest.approx(rows.obs, abs=1e-6)
+    env = trainers.make_env("any_gait")
+    _, info = env.reset(seed=5)
+    gait = mirrored_gait(gait_of(info["gait"], "any"))
+    for phase in (0.0, 0.3):
+        left, right = (gait_numbers(each, phase, False, 0.02) for each in (gait_of(info["gait"], "any"), gait))
+        found = _mirrored_gait(left[None])[0]
+        assert found == pytest.approx(right)
+    figures = image.obs[:, where][:, 24:]
+    assert figures == pytest.approx(rows.obs[:, where][:, 24:])
+
+
+def test_a_limp_is_another_gait_in_the_mirror():
+    assert mirror_shift(NAMED_GAITS["limp"]) is None
+    assert mirror_shift(dataclasses.replace(NAMED_GAITS["limp"], duty_offsets=(0.1, 0.1, 0.0, 0.0))) == 0.5

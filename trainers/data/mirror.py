@@ -7,6 +7,7 @@ import numpy as np
 from go1_mtl_gym.contract import PolicyContract
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.gaits import STAND_COMMAND, Gait
+from go1_mtl_gym.sensing.gait_numbers import LEG_NUMBERS
 from go1_mtl_gym.sensing.observation import FRAME_SIZE
 from trainers.data.demonstrations import Demonstrations
 
@@ -28,6 +29,8 @@ def mirror_shift(gait: Gait) -> float | None:
     A clock x with offsets o in the mirror is a clock x + s with the offsets themselves: o[other side] = o + s (mod 1).
     """
     offsets = np.array(gait.offsets)
+    if not np.allclose(gait.duties[OTHER_SIDE], gait.duties):
+        return None
     for shift in _SHIFTS.tolist():
         turns = offsets[OTHER_SIDE] - offsets - shift
         if np.allclose(turns, np.round(turns), atol=1e-6):
@@ -42,7 +45,7 @@ def mirrored(rows: Demonstrations) -> Demonstrations:
     phase 0 in the mirror too.
 
     Args:
-        rows: of tasks whose gaits the contract names.
+        rows: of tasks whose gaits the contract names, or with the channel "gait" and without "phase".
 
     Returns:
         Rows of those tasks whose gait is the same in the mirror, in order.
@@ -73,6 +76,8 @@ def with_mirrored(rows: Demonstrations, weights: np.ndarray | None = None) -> tu
 def _shifts(rows: Demonstrations) -> np.ndarray:
     """`mirror_shift` of every task [cycles], shape (K,); NaN where there is none, and where no row asks for it."""
     shifts = np.full(len(rows.tasks), np.nan)
+    if "gait" in rows.contract.channels and "phase" not in rows.contract.channels:
+        return np.zeros(len(rows.tasks))  # the rows say themselves what gait they are of
     for k in np.unique(rows.task).tolist():
         gait = rows.contract.gaits[k]
         if gait is None:
@@ -95,9 +100,17 @@ def _mirrored_obs(obs: np.ndarray, contract: PolicyContract, shift: np.ndarray) 
     if "leg_kinematics" in where:
         feet = obs[:, where["leg_kinematics"]].reshape(-1, 2, 4, 3)[:, :, OTHER_SIDE] * _TRUE
         image[:, where["leg_kinematics"]] = feet.reshape(len(obs), -1)
+    if "gait" in where:
+        image[:, where["gait"]] = _mirrored_gait(obs[:, where["gait"]])
     if "phase" in where:
         image[:, where["phase"]] = _turned(obs[:, where["phase"]], np.where(_rests(obs, contract), 0.0, shift))
     return image
+
+
+def _mirrored_gait(numbers: np.ndarray) -> np.ndarray:
+    """The term "gait" with left and right exchanged, shape (n, 29): each leg has the numbers of the other side's."""
+    legs = numbers[:, : 4 * LEG_NUMBERS].reshape(-1, LEG_NUMBERS, 4)[:, :, OTHER_SIDE]
+    return np.concatenate([legs.reshape(len(numbers), -1), numbers[:, 4 * LEG_NUMBERS :]], axis=1)
 
 
 def _mirrored_frame(frame: np.ndarray, contract: PolicyContract) -> np.ndarray:

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from go1_mtl_gym import TASKS
+from go1_mtl_gym import BUILT_IN_TASKS, TASKS
 from go1_mtl_gym.validation import integer_in, number_in, one_of
 from trainers.data.environments import EnvFactory, base_env, derive_seed, make_env
 from trainers.evaluation.rollout import Rollout, checked_agent, opened, run_all
@@ -56,7 +56,7 @@ def evaluate_transition(
     """
     policy_or_expert = checked_agent(policy_or_expert)
     refuse_overridden(env_kwargs, episode_s="before_s and after_s", task="first")
-    kwargs = {"tasks": tuple(TASKS), **getattr(policy_or_expert, "env_kwargs", {}), **env_kwargs}
+    kwargs = {"tasks": BUILT_IN_TASKS, **getattr(policy_or_expert, "env_kwargs", {}), **env_kwargs}
     for task in (first, second):
         one_of(task, tuple(kwargs["tasks"]), "task")
     trials, seed = integer_in(trials, 1, 10**9, "trials"), checked_seed(seed)

@@ -6,7 +6,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 
-from go1_mtl_gym import TASKS
+from go1_mtl_gym import BUILT_IN_TASKS
 from go1_mtl_gym.validation import one_of, parameters_of
 from trainers.data.environments import base_env, make_env
 from trainers.evaluation.captions import draw_captions, reading
@@ -76,7 +76,7 @@ def film_tour(
     agent = checked_agent(policy_or_expert)
     refuse_overridden(env_kwargs, episode_s="script", render_mode="film_tour", task="script")
     film = Film(width, height, fps)
-    kwargs = {"tasks": tuple(TASKS), **getattr(agent, "env_kwargs", {}), **env_kwargs, **film.env_kwargs}
+    kwargs = {"tasks": BUILT_IN_TASKS, **getattr(agent, "env_kwargs", {}), **env_kwargs, **film.env_kwargs}
     for task in script.task_names:
         one_of(task, tuple(kwargs["tasks"]), "task of the script")
     control_hz = 0.0
