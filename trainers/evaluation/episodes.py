@@ -2,12 +2,13 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, cast
 
 import gymnasium
 import numpy as np
 
-from go1_mtl_gym import TASKS
+from go1_mtl_gym import TASKS, Gait, Go1Env, Task
+from go1_mtl_gym.tasks import ANY_GAIT, any_gait_task, check_gait
 from go1_mtl_gym.validation import one_of
 from trainers.data.environments import EnvFactory, base_env, derive_seed
 from trainers.data.operator import OperatorConfig
@@ -32,9 +33,10 @@ class EpisodeSetup:
         command_interval: a new command is drawn every so many seconds; None keeps the first.
         corners: whether commands are drawn from the corners of the task's range.
         operator: whose hands drive instead, or None.
+        gait: of the task "any_gait"; None lets the environment draw it.
 
     Raises:
-        InvalidInputError: if task, seed or duration cannot be.
+        InvalidInputError: if gait, task, seed or duration cannot be.
     """
 
     task: str
@@ -44,9 +46,12 @@ class EpisodeSetup:
     command_interval: float | None = None
     corners: bool = False
     operator: OperatorConfig | None = None
+    gait: Gait | None = None
 
     def __post_init__(self) -> None:
         one_of(self.task, tuple(TASKS), "task")
+        if self.gait is not None:
+            check_gait(self.gait, self.task)
         checked_seed(self.seed)
         positive(self.seconds, "seconds")
 
@@ -101,19 +106,27 @@ class DrawnCommands:
     """
 
     def __init__(self, setup: EpisodeSetup) -> None:
-        task = TASKS[setup.task]
+        self._task = TASKS[setup.task] if setup.gait is None else any_gait_task(setup.gait)
         self._rng = np.random.default_rng(derive_seed("commands", setup.seed))
-        self._draw = task.draw_corner if setup.corners else task.draw_command
-        self._interval_s = setup.command_interval
+        self._corners, self._interval_s = setup.corners, setup.command_interval
         self.given: list[tuple[float, float, float]] = []
         self.options: dict[str, Any] = {"task": setup.task}
+        if setup.gait is not None:
+            self.options["gait"] = setup.gait
         if setup.command is not None or setup.corners:
-            self.options["command"] = tuple(self._draw(self._rng).tolist()) if setup.command is None else setup.command
+            self.options["command"] = self._drawn(self._task) if setup.command is None else setup.command
 
     def drive(self, env: gymnasium.Env, step: int) -> None:
         """Give a command if one is due; a `Watch`."""
         base = base_env(env)
         if self._interval_s and step and step % max(1, round(self._interval_s * base.control_hz)) == 0:
-            forward, sideways, yaw_rate = self._draw(self._rng).tolist()
-            self.given.append((forward, sideways, yaw_rate))
+            chosen_there = self._task.name == ANY_GAIT and "gait" not in self.options
+            task = cast(Go1Env, base).requested_task if chosen_there else self._task
+            self.given.append(self._drawn(task))
             base.set_command(self.given[-1])
+
+    def _drawn(self, task: Task) -> tuple[float, float, float]:
+        """A command of a task's range, or of its corners."""
+        draw = task.draw_corner if self._corners else task.draw_command
+        forward, sideways, yaw_rate = draw(self._rng).tolist()
+        return forward, sideways, yaw_rate

@@ -168,6 +168,7 @@ class Rollout:
             running=np.array(running, dtype=bool),
             commands=np.array([info["command"] for info in told], dtype=float).reshape(-1, 3),
             tasks=tuple(info["task"] for info in told),
+            gait_numbers=np.array([info["gait"] for info in told]) if told and "gait" in told[0] else None,
             moves=tuple(info["operator_move"] for info in told if "operator_move" in info),
             events=tuple(info["operator_events"] for info in told if "operator_events" in info),
         )

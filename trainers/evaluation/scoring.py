@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from go1_mtl_gym import TASKS, Gait
+from go1_mtl_gym.gaits import gait_of
+from go1_mtl_gym.tasks import ANY_GAIT
 from trainers.evaluation.metrics import exact_interval, touchdowns, tracking_error
 from trainers.utils.files import json_ready
 
@@ -37,6 +39,7 @@ class Series:
         tasks: names of the tasks whose gait the clock was of, after each step.
         moves: what the hands were doing, if there are any; empty otherwise.
         events: what they did in each step besides: "push", or the name of a task; empty without hands.
+        gait_numbers: `go1_mtl_gym.Gait.numbers` of the gait after each step, shape (n, 12); None: those of the tasks.
     """
 
     measured: np.ndarray
@@ -47,11 +50,16 @@ class Series:
     tasks: tuple[str, ...]
     moves: tuple[str, ...] = ()
     events: tuple[tuple[str, ...], ...] = ()
+    gait_numbers: np.ndarray | None = None
 
     @functools.cached_property
     def gaits(self) -> tuple[Gait, ...]:
-        """Of the tasks, after each step."""
-        return tuple(TASKS[name].gait for name in self.tasks)
+        """Gait after each step."""
+        if self.gait_numbers is None:
+            return tuple(TASKS[name].gait for name in self.tasks)
+        known = {numbers.tobytes(): numbers for numbers in self.gait_numbers}
+        made = {key: gait_of(numbers, ANY_GAIT) for key, numbers in known.items()}
+        return tuple(made[numbers.tobytes()] for numbers in self.gait_numbers)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -168,8 +176,8 @@ def score(
         control_hz: steps per second.
         task: name of what was asked for all the time; None where it changed: what the environment says it was.
     """
-    if task is not None:
-        series = dataclasses.replace(series, tasks=(task,) * len(series.tasks))
+    if task is not None and task != ANY_GAIT:
+        series = dataclasses.replace(series, tasks=(task,) * len(series.tasks), gait_numbers=None)
     skip, steps = round(SETTLE_S * control_hz), len(series.measured)
     window = max(1, round(max((gait.period for gait in series.gaits), default=0.0) * control_hz))
     velocity_error, yaw_error = tracking_error(series.measured, series.wanted, window, skip)
@@ -201,9 +209,13 @@ def _min_air(series: Series, control_hz: float) -> np.ndarray:
 
 
 def _changes_of_gait(series: Series, skip: int) -> int:
-    """After the first samples: each change cuts a cycle short, so that a leg may have one touchdown too many or few."""
+    """After the first samples: each change cuts a cycle short, so that a leg may have one touchdown too many or few.
+
+    A gait that becomes another one bit by bit changes once.
+    """
     gaits = series.gaits[skip:]
-    return sum(before != after for before, after in zip(gaits, gaits[1:]))
+    changed = [before != after for before, after in zip(gaits, gaits[1:])]
+    return sum(now and not before for before, now in zip([False, *changed], changed))
 
 
 def _mean(values: Sequence[float] | np.ndarray) -> float:
