@@ -23,8 +23,10 @@ from trainers.evaluation.episodes import EpisodeSetup
 from trainers.play.controls import SHIFT_KEYS, STICK_KEYS, Controls
 from trainers.play.hands import Hands
 from trainers.play.loop import play_on
+from trainers.play.options import PlayOptions
 from trainers.play.player import Player
 from trainers.play.session import Session
+from trainers.play.surfaces import _invitation
 
 viser = pytest.importorskip("viser", reason="the extra `web` is not installed")
 msgspec = pytest.importorskip("msgspec")
@@ -34,7 +36,7 @@ from trainers.play.browser.buttons import _code  # noqa: E402
 from trainers.play.browser.geometry import CONE, TUBE, instances, unit_mesh  # noqa: E402
 from trainers.play.browser.holds import SILENT_S, Holds  # noqa: E402
 from trainers.play.browser.readouts import report  # noqa: E402
-from trainers.play.browser.surface import Browser, PrivateServer  # noqa: E402
+from trainers.play.browser.surface import MOST_WAITING, Browser, PrivateServer  # noqa: E402
 
 SETUP = EpisodeSetup("trot", 3, 1e6, command=(0.0, 0.0, 0.0))
 PATIENCE_S = 60.0
@@ -61,8 +63,8 @@ def browser(player):
 class Tab:
     """A browser's end of the line, without the browser."""
 
-    def __init__(self, browser: Browser, azimuth: float = 0.0) -> None:
-        self._browser = browser
+    def __init__(self, browser: Browser, azimuth: float = 0.0, width: int = 10) -> None:
+        self._browser, self._width = browser, width
         self._line = connect(
             browser.link.replace("http", "ws"), subprotocols=[f"viser-v{viser.__version__}"], max_size=None
         )
@@ -74,7 +76,7 @@ class Tab:
         x, y = float(np.cos(azimuth)), float(np.sin(azimuth))
         self._send(
             "ViewerCameraMessage", wxyz=(1, 0, 0, 0), position=(-x, -y, 0.5), look_at=(0, 0, 0.2), fov=1.0, near=0.1,
-            far=100.0, image_height=10, image_width=10, up_direction=(0, 0, 1),
+            far=100.0, image_height=10, image_width=self._width, up_direction=(0, 0, 1),
         )  # fmt: skip
 
     def hold(self, key: str) -> None:
@@ -169,6 +171,39 @@ def test_without_hands_there_is_nothing_to_drive_with(student):
         assert {"W", "1", "P"}.isdisjoint(browser.button_ids) and {"SPACE", "R"} <= set(browser.button_ids)
         browser.draw()
         browser.close()
+
+
+def test_clicks_that_nobody_could_make_hold_nothing_up(browser, player, monkeypatch):
+    acts = []
+
+    def act():
+        acts.append(browser._post(act))  # more comes while it is done
+
+    for _ in range(3 * MOST_WAITING):
+        browser._post(act)
+    assert browser.poll() and len(acts) <= MOST_WAITING
+    monkeypatch.setattr("trainers.play.browser.surface.LONGEST_POLL_S", 0.0)
+    acts.clear()
+    assert browser.poll() and not acts, "what there is no time for waits"
+
+
+@pytest.mark.parametrize(
+    ("host", "tunnel"),
+    [("127.0.0.1", "8080:127.0.0.1:8080"), ("::1", "8080:[::1]:8080"), ("localhost", "8080:localhost")],
+)
+def test_the_way_from_another_machine_is_one_that_ssh_takes(host, tunnel):
+    link = f"http://{f'[{host}]' if ':' in host else host}:8080"
+    assert f"ssh -N -L {tunnel}" in _invitation(link, PlayOptions(web=True, host=host))
+
+
+def test_on_an_upright_phone_the_robot_is_above_the_panel(browser):
+    wide, narrow = Tab(browser), Tab(browser, width=4)
+    clients = browser._server.get_clients()
+    until(browser, lambda: len(clients) == 2)
+    heights = sorted(client.camera.look_at[2] for client in clients.values())
+    until(browser, lambda: min(client.camera.look_at[2] for client in clients.values()) < 0.0)
+    assert heights[-1] == pytest.approx(0.2)
+    wide.close(), narrow.close()
 
 
 def test_no_page_can_open_the_robot_to_the_public(browser, monkeypatch):

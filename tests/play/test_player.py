@@ -13,9 +13,10 @@ from trainers.play.camera import AIM_HEIGHT, Camera
 from trainers.play.controls import GENTLE, Controls
 from trainers.play.gamepad import Gamepad
 from trainers.play.hands import Hands
+from trainers.play.loop import play_on
 from trainers.play.player import LYING_S, Player
 from trainers.play.session import Session
-from trainers.play.status import button_at, play_panels
+from trainers.play.status import button_at, notice_of, play_panels
 from trainers.play.window import _key_names
 
 SETUP = EpisodeSetup("trot", 3, 60.0, command=(0.0, 0.0, 0.0))
@@ -63,6 +64,37 @@ def test_a_machine_that_is_too_slow_is_said_to_be(player):
     for _ in range(3):
         assert player.advance(1.0) == 25, "half a second is made up for, not more"
     assert player.factor == pytest.approx(0.5)
+
+
+class SlowSurface:
+    """Something on which a picture takes two seconds."""
+
+    largest_hz = 1000.0
+
+    def __init__(self, clock):
+        self.clock, self.left = clock, 4
+
+    def poll(self):
+        self.left -= 1
+        return self.left >= 0
+
+    def draw(self, notice=None):
+        self.clock.now += 2.0
+
+
+class Clock:
+    now = 0.0
+
+    def perf_counter(self):
+        return self.now
+
+
+def test_pictures_that_take_long_are_part_of_the_time(player, monkeypatch):
+    clock = Clock()
+    monkeypatch.setattr("trainers.play.loop.time", clock)
+    play_on(SlowSurface(clock), player)
+    assert player.session.time_s == pytest.approx(1.5)
+    assert player.factor == pytest.approx(0.25), "half a second of every two"
 
 
 class Collapse:
@@ -216,6 +248,36 @@ def test_a_gamepad_drives(player, controls):
 
 
 # -- Camera ------------------------------------------------------------------------------------------------------------
+
+
+def test_a_robot_that_is_nowhere_is_not_followed():
+    camera = Camera()
+    camera.follow(np.array([3.0, -1.0, 0.3]), 0.5, 10.0)
+    before = camera.mjv.lookat.copy(), camera.mjv.azimuth
+    camera.follow(np.array([np.nan, 0.0, 0.3]), 0.5, 10.1)
+    camera.follow(np.array([3.0, 0.0, 0.3]), np.nan, 10.2)
+    np.testing.assert_array_equal(camera.mjv.lookat, before[0])
+    assert camera.mjv.azimuth == before[1]
+    camera.follow(np.array([0.0, 0.0, 0.3]), 0.0, 0.0)
+    np.testing.assert_allclose(camera.mjv.lookat, [0.0, 0.0, AIM_HEIGHT], atol=1e-9)
+
+
+def test_a_robot_that_diverges_while_it_lies_begins_anew(player, monkeypatch):
+    ends = iter(["fall", "unstable", "unstable"])
+    step = player.session.env.step
+
+    def diverging(action):
+        *rest, info = step(action)
+        return (*rest, info | {"ended": next(ends, "")})
+
+    monkeypatch.setattr(player.session.env, "step", diverging)
+    player.step()
+    assert player.session.ended == "fall" and not player.over
+    player.step()
+    assert player.session.ended == "unstable" and player.over
+    assert notice_of(player).startswith("the physics has diverged")
+    player.step()
+    assert player.session.steps == 1, "it stood up"
 
 
 def test_the_camera_follows_and_turns():

@@ -59,10 +59,13 @@ def test_evaluate_policy_earns_the_same(policy, normalized):
 
 
 def test_observations_of_another_time_or_place_are_refused(policy, normalized):
-    shown, before = OriginalObs(policy, normalized), normalized.reset()
+    shown = OriginalObs(policy, normalized)
+    with pytest.raises(InvalidInputError, match=r"was never reset: call its reset\(\) first"):
+        shown.predict(np.zeros(2))
+    before = normalized.reset()
     normalized.step(np.ones((2, 12), dtype=np.float32))
-    for other in (before, before[:1]):
-        with pytest.raises(InvalidInputError, match="that VecNormalize gave last"):
+    for other, message in ((before, "got others of equal shape"), (before[:1], r"got some of shape \(1, ")):
+        with pytest.raises(InvalidInputError, match=f"that VecNormalize gave last were expected, {message}"):
             shown.predict(other)
     with pytest.raises(InvalidInputError, match="VecNormalize was expected, got VecMonitor"):
         OriginalObs(policy, environments())

@@ -57,6 +57,29 @@ def environment() -> dict[str, str]:
     return os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
 
 
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+def test_a_program_that_is_told_to_end_may_keep_what_is_done(name, capsys):
+    number, kept = getattr(signal, name), []
+
+    @main
+    def program(arguments=None):
+        try:
+            os.kill(os.getpid(), number)
+            time.sleep(10)
+        finally:
+            kept.append(True)
+
+    before = signal.signal(number, signal.SIG_DFL)
+    try:
+        assert program([]) == 128 + number and kept == [True]
+        assert signal.getsignal(number) is signal.SIG_DFL
+        signal.signal(number, signal.SIG_IGN)  # as nohup does
+        assert ends_with(None) == 0 and signal.getsignal(number) is signal.SIG_IGN
+    finally:
+        signal.signal(number, before)
+    assert capsys.readouterr().err == "\nterminated\n"
+
+
 def test_ctrl_c_waits_until_the_workers_have_begun():
     other = threading.Thread(target=time.sleep, args=(0.5,))  # may receive the signal in this one's place
     other.start()

@@ -50,8 +50,11 @@ class Camera:
         Args:
             position_w: of the trunk [m], shape (3,).
             yaw: of the trunk [rad].
-            time_s: of the state [s]; one before the last time begins anew.
+            time_s: of the state [s]; one before the last time begins anew. A robot that is nowhere, because the physics
+                has diverged, is not followed.
         """
+        if not np.isfinite([*position_w, yaw]).all():
+            return
         passed_s, self._time_s = time_s - self._time_s, time_s
         fraction = 1.0 - np.exp(-passed_s / FOLLOW_S) if passed_s >= 0.0 else 1.0
         turn = fraction * np.arctan2(np.sin(yaw - self._yaw), np.cos(yaw - self._yaw))

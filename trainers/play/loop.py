@@ -9,8 +9,8 @@ import numpy as np
 from go1_mtl_gym.rendering import Pace
 from trainers.play.player import Player
 
-LONGEST_PICTURE_S = 1.0
-"""Time that passed since the last picture counts up to this [s]."""
+LONGEST_PICTURE_S = 60.0
+"""Time that passed since the last picture counts up to this [s]: a machine may have slept meanwhile."""
 LOADING = "the expert is being loaded: some seconds, half a minute the first time"
 
 

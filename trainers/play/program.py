@@ -109,7 +109,9 @@ def _film(player: Player, film: FilmFile, size: tuple[int, int]) -> None:
 
 
 def _play(player: Player, film: FilmFile | None, options: PlayOptions) -> None:
-    surface = opened_surface(player, options, options.size or LARGE_FILM_SIZE)
+    on_page = options.web or not has_display()
+    small = on_page and film is not None and film.waits  # nobody sees the pictures that become a page's film
+    surface = opened_surface(player, options, options.size or (FILM_SIZE if small else LARGE_FILM_SIZE))
     try:
         play_on(surface, player, each=Recording(player, film, surface.picture) if film is not None else lambda: None)
         if film is not None and film.is_still:

@@ -116,7 +116,7 @@ class Session:
         self._obs, _, _, _, info = self.env.step(action)
         self._told.append(info)
         self.steps, self._expert_action = self.steps + 1, None
-        self.ended = self.ended or info["ended"]
+        self.ended = info["ended"] if info["ended"] == "unstable" else self.ended or info["ended"]
 
     def waits_for_expert(self, ghost: bool) -> bool:
         """Whether the expert is needed next and was never asked, which takes long once.

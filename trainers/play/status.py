@@ -80,6 +80,8 @@ def notice_of(player: Player) -> str:
     session = player.session
     if session.ended == "time":
         return "the end  (R: once more)"
+    if session.ended == "unstable":
+        return "the physics has diverged  (R: once more)"
     if session.ended:
         return "fallen  (R: stand up)"
     if player.paused:

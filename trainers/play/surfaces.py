@@ -33,9 +33,11 @@ def opened_surface(player: Player, options: PlayOptions, size: tuple[int, int]) 
         if error.name not in WEB_PACKAGES:
             raise
         why = "" if options.web else "there is no display, and "
+        instead = "add --record FILE.webp to film it without either"
+        if options.record is not None:
+            instead = "leave out --web to film a tour without either"
         raise RenderingError(
-            f"{why}a page in a browser needs {error.name}: {INSTALL}, or the extra `web`; or add --record FILE.webp to "
-            "film it without either"
+            f"{why}a page in a browser needs {error.name}: {INSTALL}, or the extra `web`; or {instead}"
         ) from error
     browser = Browser(player, options.host, options.port, size)
     print(_invitation(browser.link, options), flush=True)
@@ -48,7 +50,8 @@ def _invitation(link: str, options: PlayOptions) -> str:
     lines = [f"{why}drive in a browser at {link} (Ctrl+C here ends it)"]
     port = link.rpartition(":")[2]
     if options.host in LOOPBACKS:
-        tunnel = f"ssh -N -L {port}:{options.host}:{port} {socket.gethostname()}"
+        host = f"[{options.host}]" if ":" in options.host else options.host
+        tunnel = f"ssh -N -L {port}:{host}:{port} {socket.gethostname()}"
         lines += [f"from another machine: {tunnel}, then the same link there"]
     else:
         lines += ["everybody who can reach this machine there can drive"]

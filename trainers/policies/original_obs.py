@@ -63,11 +63,18 @@ class OriginalObs:
         Raises:
             InvalidInputError: if that is not what it gave last; the original of any other is not known.
         """
+        if not hasattr(self._normalizing, "old_obs"):  # stable-baselines3 has it from the first reset on
+            raise InvalidInputError("the vector environment was never reset: call its reset() first")
         original = self._normalizing.get_original_obs()
         shown = np.asarray(self._normalizing.normalize_obs(original))
-        if np.shape(observation) != shown.shape or not np.allclose(observation, shown, rtol=0.0, atol=ROUNDING):
+        if np.shape(observation) != shown.shape:
             raise InvalidInputError(
-                f"the observations of shape {shown.shape} that VecNormalize gave last were expected, got others, of "
-                f"shape {np.shape(observation)}"
+                f"the observations of shape {shown.shape} that VecNormalize gave last were expected, got some of shape "
+                f"{np.shape(observation)}"
+            )
+        if not np.allclose(observation, shown, rtol=0.0, atol=ROUNDING):
+            raise InvalidInputError(
+                "the observations that VecNormalize gave last were expected, got others of equal shape; what is not "
+                "normalized goes to the policy itself"
             )
         return self.policy.predict(original, state, episode_start, deterministic)

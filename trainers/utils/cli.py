@@ -1,12 +1,16 @@
 """Programs for the command line: an error is one sentence on stderr and an exit status, never a traceback."""
 
 import argparse
+import contextlib
 import functools
+import os
 import shlex
 import shutil
+import signal
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
+import threading
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from go1_mtl_gym.errors import Go1Error, InvalidInputError
@@ -46,7 +50,11 @@ def main(program: Program) -> Callable[..., int]:
     @functools.wraps(program)
     def run(arguments: Sequence[str] | None = None) -> int:
         try:
-            program(arguments)
+            with _interrupted_by_signals():
+                program(arguments)
+        except Terminated as end:
+            print("\nterminated", file=sys.stderr)
+            return 128 + end.number
         except KeyboardInterrupt as interrupt:
             print("; ".join(["\ninterrupted", *map(str, interrupt.args)]), file=sys.stderr)
             return INTERRUPTED
@@ -56,6 +64,43 @@ def main(program: Program) -> Callable[..., int]:
         return 0
 
     return run
+
+
+class Terminated(KeyboardInterrupt):
+    """The program was told to end by another signal than Ctrl-C: by ``kill``, or since its terminal is gone.
+
+    Args:
+        number: of the signal.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__()
+        self.number = number
+
+
+@contextlib.contextmanager
+def _interrupted_by_signals() -> Iterator[None]:
+    """Let what would end the process at once end it as Ctrl-C does: what is done is kept."""
+    names = ("SIGTERM", "SIGHUP")
+    numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
+    if threading.current_thread() is not threading.main_thread():
+        numbers = []  # Python has signals in its main thread alone
+    own, before = os.getpid(), {number: signal.getsignal(number) for number in numbers}
+
+    def end(number: int, frame: object) -> None:
+        if os.getpid() == own:
+            raise Terminated(number)
+        signal.signal(number, signal.SIG_DFL)  # a process that was forked from this one
+        os.kill(os.getpid(), number)
+
+    replaced = [number for number, handler in before.items() if handler is signal.SIG_DFL]  # nohup ignores one
+    for number in replaced:
+        signal.signal(number, end)
+    try:
+        yield
+    finally:
+        for number in replaced:
+            signal.signal(number, signal.SIG_DFL)
 
 
 def positive_float(text: str) -> float:

@@ -25,6 +25,8 @@ ACTIONS = (
 )  # fmt: skip
 LOOKS = ("SPACE", "N", "G", "MINUS", "EQUAL", "C", "R", "T")
 """What there is to do where no hands drive."""
+NOT_HERE = ("H, Esc",)
+"""Of `HELP`: keys of the window alone."""
 CODES = {"SPACE": "Space", "MINUS": "Minus", "EQUAL": "Equal", "LEFT_SHIFT": "ShiftLeft", "RIGHT_SHIFT": "ShiftRight"}
 """Codes that browsers give to keys, where they do not follow from the names."""
 ARROWS = {"UP": "ArrowUp", "DOWN": "ArrowDown", "LEFT": "ArrowLeft", "RIGHT": "ArrowRight"}
@@ -175,5 +177,6 @@ def _code(key: str) -> str:
 
 
 def _help() -> str:
-    rows = "".join(f"<tr><td>{html.escape(keys)}</td><td>{html.escape(does)}</td></tr>" for keys, does in HELP)
+    shown = [(keys, does) for keys, does in HELP if keys not in NOT_HERE]
+    rows = "".join(f"<tr><td>{html.escape(keys)}</td><td>{html.escape(does)}</td></tr>" for keys, does in shown)
     return f'<table style="font-size: 0.85em; margin: 0 0.75em 0.5em; border-spacing: 0.6em 0.1em">{rows}</table>'

@@ -32,6 +32,8 @@ PLOT_S = 10.0
 PLOT_HEIGHT = 120
 WIDTH, ROW = 300.0, 20.0
 """Of the drawing, in its own units."""
+ONE_LINE = "min-height: 1.5em; white-space: nowrap; overflow: hidden; text-overflow: ellipsis"
+"""Of text that must not move what stands below it."""
 LIGHT, DIM = "#e8ecf1", "#9aa5b1"
 
 
@@ -121,7 +123,7 @@ def report(player: Player, reading: Reading, notice: str | None = None) -> str:
         f'<span style="color: {driver_color}">{session.driver} drives</span><span>{session.time_s:.1f} s</span></div>'
         f'<div style="display: flex; justify-content: space-between"><span>{_clock(state.phase)} {phase}</span>'
         f'<span style="color: {DIM}">real time {player.factor:.2f}</span></div>'
-        f'<div style="color: {_css(EXPERT_COLOR)}; min-height: 1.5em">{html.escape(said)}</div>'
+        f'<div style="color: {_css(EXPERT_COLOR)}; {ONE_LINE}">{html.escape(said)}</div>'
         f"{_drawing(reading)}</div>"
     )
 

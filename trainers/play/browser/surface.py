@@ -28,6 +28,10 @@ from trainers.play.scene import Ghost, furnish
 TITLE = "go1-mtl-gym"
 LARGEST_HZ = 30.0
 """Pictures per second; more would only fill the line to another machine."""
+NARROW, PHONE_SHIFT = 0.8, 0.35
+"""Pages narrower than this share of their height look lower, by so much of the camera's distance."""
+LONGEST_POLL_S, MOST_WAITING = 0.05, 500
+"""Time that is spent on what was done in tabs between two pictures [s], and how much of it may wait."""
 CAPACITY = 2000
 """Geoms of the scene."""
 FLOOR: dict[str, Any] = {
@@ -69,7 +73,7 @@ class Browser:
     ) -> None:
         self._player, self.controls = player, Controls(player)
         self._holds = Holds(self.controls)
-        self._inbox: queue.SimpleQueue[Callable[[], object]] = queue.SimpleQueue()
+        self._inbox: queue.Queue[Callable[[], object]] = queue.Queue(MOST_WAITING)
         self._film_size = film_size
         self._off_screen: OffScreen | None = None
         self._ghost: Ghost | None = None
@@ -99,12 +103,23 @@ class Browser:
         self._mirror = Mirror(server.scene, model)
         server.gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False, control_width="medium")
         self._readouts = Readouts(server.gui, player)
-        self._buttons = Buttons(server.gui, player, self.controls, self._holds, self._inbox.put, self._turn_to)
+        self._buttons = Buttons(server.gui, player, self.controls, self._holds, self._post, self._turn_to)
         self._readouts.add_plots()
 
         @server.on_client_disconnect
         async def _(tab: Any) -> None:
-            self._inbox.put(lambda: self._holds.leave(tab.client_id))
+            self._post(lambda: self._holds.leave(tab.client_id))
+
+        @server.on_client_connect
+        async def _(tab: Any) -> None:
+            if tab.camera.aspect < NARROW:  # a panel covers the lower half of an upright phone
+                look_at = np.array([0.0, 0.0, AIM_HEIGHT - PHONE_SHIFT * mjv.distance])
+                tab.camera.look_at = tuple(look_at)
+
+    def _post(self, act: Callable[[], object]) -> None:
+        """Have something done between two pictures, in the thread that plays, unless too much waits already."""
+        with contextlib.suppress(queue.Full):
+            self._inbox.put_nowait(act)
 
     @property
     def link(self) -> str:
@@ -130,9 +145,14 @@ class Browser:
     # -- What a surface does -------------------------------------------------------------------------------------------
 
     def poll(self) -> bool:
-        """Take in what was done in all tabs; True, since none of them can end the playing for the others."""
+        """Take in what was done in all tabs; True, since none of them can end the playing for the others.
+
+        What cannot be done between two pictures waits, and what comes faster than anybody clicks is left out.
+        """
+        end, waiting = time.monotonic() + LONGEST_POLL_S, self._inbox.qsize()
         with contextlib.suppress(queue.Empty):
-            while True:
+            while waiting > 0 and time.monotonic() < end:
+                waiting -= 1
                 self._inbox.get_nowait()()
         self._holds.forget_silent(time.monotonic())
         return True
