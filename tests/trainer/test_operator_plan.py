@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from go1_mtl_gym import TASKS
+from go1_mtl_gym import TASKS, GaitSpace
+from go1_mtl_gym.tasks import ANY_GAIT
 from trainers.data.operator import MOVES, OperatorConfig
 from trainers.data.operator_plan import RELEASED, draw_plan
 
@@ -138,3 +139,28 @@ def test_hard_pushes_are_shares_of_what_the_expert_bears():
 
 def test_a_seed_decides_everything():
     assert plan(7, 60.0) == plan(7, 60.0) and plan(7, 60.0) != plan(8, 60.0)
+
+
+# -- Any gait ----------------------------------------------------------------------------------------------------------
+
+
+def test_where_any_gait_can_be_every_change_asks_for_another():
+    space = GaitSpace()
+    rng = np.random.default_rng(2)
+    drawn = draw_plan(OperatorConfig(), ANY_GAIT, (ANY_GAIT,), 400.0, rng, space)
+    assert len(drawn.changes) == len(drawn.gaits) > 40
+    assert {task for _, task in drawn.changes} == {ANY_GAIT}
+    assert all(space.contains(asked.gait) for asked in drawn.gaits)
+    assert len({asked.gait for asked in drawn.gaits}) == len(drawn.gaits)
+    slews = np.array([asked.slew_s for asked in drawn.gaits])
+    assert 0.3 < (slews == 0.0).mean() < 0.7 and 0.0 < slews[slews > 0].min() < slews.max() <= 1.0
+    first, second = drawn.changes[0][0], drawn.changes[1][0]
+    assert drawn.gaits_in(0.0, first) == [drawn.gaits[0]] and drawn.gaits_in(first, second) == [drawn.gaits[1]]
+
+
+def test_hands_move_alike_whether_or_not_gaits_are_drawn():
+    named = plan(seconds=100.0)
+    any_gait = draw_plan(OperatorConfig(), ANY_GAIT, (ANY_GAIT,), 100.0, np.random.default_rng(0), GaitSpace())
+    assert named.segments == any_gait.segments and named.pushes == any_gait.pushes and not named.gaits
+    calm = OperatorConfig().of_one_gait()
+    assert not draw_plan(calm, ANY_GAIT, (ANY_GAIT,), 100.0, np.random.default_rng(0), GaitSpace()).gaits

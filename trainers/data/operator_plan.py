@@ -7,6 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from go1_mtl_gym.gait_space import GaitSpace
+from go1_mtl_gym.gaits import Gait
+from go1_mtl_gym.wrappers import GAIT_SLEW_S
 from trainers.data.operator import MOVES, OperatorConfig
 
 RELEASED = (0.0, 0.0, 0.0)
@@ -52,6 +55,19 @@ class Push:
 
 
 @dataclasses.dataclass(frozen=True)
+class NextGait:
+    """A gait that is asked for.
+
+    Attributes:
+        gait: which.
+        slew_s: how long the present one takes to become it; 0 lets it begin at once [s].
+    """
+
+    gait: Gait
+    slew_s: float
+
+
+@dataclasses.dataclass(frozen=True)
 class OperatorPlan:
     """All that one pair of hands will do in an episode, whatever the robot does.
 
@@ -60,12 +76,14 @@ class OperatorPlan:
         segments: of the stick, in order of time, without gaps.
         changes: (time [s], task) of each change of gait, in order.
         pushes: in order of time.
+        gaits: that each change asks for, where any gait can be; empty where tasks have their own.
     """
 
     task: str
     segments: tuple[Segment, ...]
     changes: tuple[tuple[float, str], ...]
     pushes: tuple[Push, ...]
+    gaits: tuple[NextGait, ...] = ()
 
     def move(self, time_s: float) -> str:
         """What the hand is doing at a time."""
@@ -82,6 +100,10 @@ class OperatorPlan:
         """The tasks that are asked for later than one time and not later than another, in order."""
         return [task for time_s, task in self.changes if after_s < time_s <= until_s]
 
+    def gaits_in(self, after_s: float, until_s: float) -> list[NextGait]:
+        """The gaits that are asked for later than one time and not later than another, in order."""
+        return [gait for (time_s, _), gait in zip(self.changes, self.gaits) if after_s < time_s <= until_s]
+
     def pushes_in(self, after_s: float, until_s: float) -> list[Push]:
         """The pushes later than one time and not later than another."""
         return [push for push in self.pushes if after_s < push.time_s <= until_s]
@@ -96,7 +118,12 @@ class OperatorPlan:
 
 
 def draw_plan(
-    config: OperatorConfig, task: str, tasks: Sequence[str], seconds: float, rng: np.random.Generator
+    config: OperatorConfig,
+    task: str,
+    tasks: Sequence[str],
+    seconds: float,
+    rng: np.random.Generator,
+    gaits: GaitSpace | None = None,
 ) -> OperatorPlan:
     """Draw what hands will do for some time.
 
@@ -106,15 +133,27 @@ def draw_plan(
         tasks: all that there is a button for; with a single one, or without a `task_interval`, the gait stays.
         seconds: at least as long as the episode [s].
         rng: where the randomness comes from.
+        gaits: where the next gait is drawn from where any gait can be; None: tasks have their own.
     """
-    stick_rng, task_rng, push_rng = rng.spawn(3)
+    stick_rng, task_rng, push_rng, gait_rng = rng.spawn(4)
     segments = _Hand(config, stick_rng).segments(seconds)
+    buttons = tasks if gaits is None else (task, "another gait")
+    changes = _changes(config, task, buttons, segments, seconds, task_rng)
+    if gaits is not None:
+        changes = [(time_s, task) for time_s, _ in changes]
     return OperatorPlan(
         task,
         tuple(segments),
-        tuple(_changes(config, task, tasks, segments, seconds, task_rng)),
+        tuple(changes),
         tuple(_pushes(config, seconds, push_rng)),
+        () if gaits is None else tuple(_next_gait(gaits, gait_rng) for _ in changes),
     )
+
+
+def _next_gait(gaits: GaitSpace, rng: np.random.Generator) -> NextGait:
+    """Any gait, every other time at once."""
+    gait, at_once, slew_s = gaits.draw(rng), rng.uniform() < 0.5, float(rng.uniform(*GAIT_SLEW_S))
+    return NextGait(gait, 0.0 if at_once else slew_s)
 
 
 class _Hand:

@@ -8,8 +8,9 @@ import numpy as np
 from go1_mtl_gym import TASKS, Task
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.seeded_wrapper import SeededWrapper
+from go1_mtl_gym.tasks import ANY_GAIT, any_gait_task
 from trainers.data.operator import OperatorConfig
-from trainers.data.operator_plan import OperatorPlan, Push, draw_plan
+from trainers.data.operator_plan import NextGait, OperatorPlan, Push, draw_plan
 
 LONGEST_S = 600.0
 """Plans are drawn for episodes of up to this length [s]; afterwards the stick stays where it is."""
@@ -22,7 +23,7 @@ class OperatorWrapper(SeededWrapper):
     hands. The command is the stick times the `command_range` of the task that was asked for last.
 
     ``info["operator_move"]`` names the move of the present instant, ``info["operator_events"]`` what came with the last
-    step: "push", or the name of a task.
+    step: "push", or the name of a task, "any_gait" for another gait where any can be.
 
     Args:
         env: a `Go1Env`, wrapped or not.
@@ -60,7 +61,8 @@ class OperatorWrapper(SeededWrapper):
         env = self._go1
         observation, info = super().reset(seed=seed, options=options)
         seconds = min(env.config.episode_s, LONGEST_S) + 1.0
-        self._plan = draw_plan(self.operator, env.task.name, env.tasks, seconds, self._rng)
+        gaits = env.config.gaits if env.tasks == (ANY_GAIT,) else None
+        self._plan = draw_plan(self.operator, env.task.name, env.tasks, seconds, self._rng, gaits)
         self._move_stick(self._plan, 0.0)
         self._time_s = 0.0
         told = {"command": env.command, "operator_move": self._plan.move(0.0), "operator_events": ()}
@@ -73,8 +75,10 @@ class OperatorWrapper(SeededWrapper):
         if plan is not None:
             before, self._time_s = self._time_s, self._time_s + env.control_s
             tasks, pushes = plan.changes_in(before, self._time_s), plan.pushes_in(before, self._time_s)
-            for task in tasks:
+            for task in tasks if not plan.gaits else ():
                 self._change_task(task)
+            for gait in plan.gaits_in(before, self._time_s):
+                self._change_gait(gait)
             for push in pushes:
                 self._push(push)
             self._move_stick(plan, self._time_s)
@@ -96,6 +100,12 @@ class OperatorWrapper(SeededWrapper):
         size = push.size * env.task.largest_push(push.angle) if push.hard else push.size
         angle = push.angle + env.state.rpy[2]
         env.push([size * np.cos(angle), size * np.sin(angle), 0.0])
+
+    def _change_gait(self, asked: NextGait) -> None:
+        """Ask for a gait, as `_change_task` for a task."""
+        env = self._go1
+        reach = self._reach(any_gait_task(asked.gait))
+        env.set_gait(asked.gait, asked.slew_s, np.clip(env.command, -reach, reach))
 
     def _change_task(self, task: str) -> None:
         """Press a button; a command beyond the new task's reach is brought to its border first."""

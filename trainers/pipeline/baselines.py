@@ -18,6 +18,8 @@ BASELINES = ("pooled", "paper_literal")
 
 def baseline_names(config: JobConfig) -> list[str]:
     """Those that differ from the policy itself."""
+    if config.is_any_gait:
+        return []  # there is no task id to be left out, and nothing else says which gait is asked for
     return [name for name in BASELINES if not (name == "paper_literal" and config.is_literal)]
 
 

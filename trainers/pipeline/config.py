@@ -13,7 +13,7 @@ from go1_mtl_gym import BUILT_IN_TASKS, DomainRandomization
 from go1_mtl_gym.env_config import DEFAULT_CHANNELS, DEFAULT_HISTORY
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.sensing.observation import CHANNELS
-from go1_mtl_gym.tasks import check_task_names
+from go1_mtl_gym.tasks import ANY_GAIT, check_task_names
 from go1_mtl_gym.validation import interval_s, number_in, one_of
 from trainers.algorithms.config import BCConfig, DAggerConfig, PhaseConfig
 from trainers.data.environments import PerturbationConfig
@@ -221,7 +221,7 @@ class JobConfig:
             noise_rad: largest standard deviation of the noise on actions [rad].
             hard_push_interval: mean time between the hard pushes of the operator, if there is one [s].
         """
-        operator, several = self.operator, len(self.tasks) > 1
+        operator, several = self.operator, len(self.tasks) > 1 or self.is_any_gait
         if operator is not None:
             operator = dataclasses.replace(
                 operator if several else operator.of_one_gait(),
@@ -249,6 +249,11 @@ class JobConfig:
     def is_literal(self) -> bool:
         """Whether the policy sees what the paper's sees, and the paper-literal baseline would be the same again."""
         return not self.channels and self.history == 1
+
+    @property
+    def is_any_gait(self) -> bool:
+        """Whether the one task is that whose gait is drawn."""
+        return self.tasks == (ANY_GAIT,)
 
     @property
     def has_clock(self) -> bool:

@@ -45,8 +45,10 @@ def parts(config: JobConfig) -> dict[str, Parts]:
         watched_s = POLICY_S * rate * gaits * config.phase_free_s
         out["phase_free"] = {"watch": (1, BEGIN_S + watched_s), "phase": (1, PHASE_STEP_S * config.phase_free_steps)}
     steps = config.clone_steps + config.rounds * config.round_steps
-    out["baselines"] = {"baselines": (1, BEGIN_S + 2 * step_s * steps * (1.25 if workers > 1 else 1.0))}
-    out["evaluation"] = {"evaluate": (AGENTS * gaits * hands, 1.2 * config.episodes * episodes_s)}
+    if not config.is_any_gait:
+        out["baselines"] = {"baselines": (1, BEGIN_S + 2 * step_s * steps * (1.25 if workers > 1 else 1.0))}
+    agents = 2 if config.is_any_gait else AGENTS
+    out["evaluation"] = {"evaluate": (agents * gaits * hands, 1.2 * config.episodes * episodes_s)}
     out["pictures"] = {"videos": (1, BEGIN_S + FILM_S * gaits * config.video_s)}
     return out
 

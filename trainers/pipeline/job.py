@@ -36,6 +36,8 @@ from trainers.utils.wandb_log import check_wandb
 
 DRAWN, OPERATOR = "drawn", "operator"
 """Where commands come from in the closed loop: the task's range, or hands."""
+ANY_GAIT_ENVS = 6
+"""Environments of a DAgger round in which the gait can be any."""
 IN_HANDS = ("success_rate", "survival_rate", "velocity_error")
 """What ``metrics.json`` tells of the episodes in an operator's hands."""
 
@@ -145,10 +147,11 @@ class Job:
 
     @contextlib.contextmanager
     def _venv(self) -> Iterator[VecEnv]:
-        """One environment per task, as DAgger rounds want them."""
+        """One environment per task, as DAgger rounds want them; several where one task stands for all gaits."""
         config = self.config
         kwargs = config.env_kwargs | config.randomization_kwargs(config.randomized)
-        venv = make_venv(config.tasks, 1, kwargs, config.round_perturbation, subproc=config.n_envs > 1)
+        per_task = ANY_GAIT_ENVS if config.is_any_gait else 1
+        venv = make_venv(config.tasks, per_task, kwargs, config.round_perturbation, subproc=config.n_envs > 1)
         try:
             yield venv
         finally:
@@ -194,6 +197,8 @@ class Job:
     def baselines(self) -> dict[str, Any]:
         """The pooled and the paper-literal policy by name, trained on the same rows with as many gradient steps."""
         paths = {name: self.folder.parts / f"{name}.zip" for name in baseline_names(self.config)}
+        if not paths:
+            return {}
         missing = [name for name, path in paths.items() if not path.is_file()]
         if missing:
             with self._stage("baselines"):

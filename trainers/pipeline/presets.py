@@ -4,6 +4,8 @@ import os
 from typing import Any
 
 from go1_mtl_gym import PAPER_TASKS
+from go1_mtl_gym.env_config import ANY_GAIT_CHANNELS
+from go1_mtl_gym.tasks import ANY_GAIT
 
 PRESETS: dict[str, dict[str, Any]] = {
     "default": {},
@@ -43,6 +45,24 @@ PRESETS: dict[str, dict[str, Any]] = {
         "phase_free_s": 480.0,
         "phase_free_steps": 8000,
     },
+    "any_gait": {
+        "tasks": (ANY_GAIT,),
+        "channels": ANY_GAIT_CHANNELS,
+        "clean_s": 60.0,
+        "perturbed_s": 1800.0,
+        "hard_push_s": 300.0,
+        "randomized_s": 600.0,
+        "held_out_s": 300.0,
+        "dagger_s": 480.0,
+        "width": 384,
+        "clone_steps": 10_000,
+        "round_steps": 5000,
+        "phase_free_s": 0.0,
+        "episodes": 50,
+        "round_episodes": 20,
+        "round_video_s": 4.0,
+        "video_s": 12.0,
+    },
     # arXiv 2505.08574: 20 commands of 30 s per gait at 1 kHz, clean; min-max scaling; 2560 units; no DAgger.
     "paper": {
         "tasks": PAPER_TASKS,
@@ -72,6 +92,7 @@ ABOUT = {
     "default": "about half an hour on two quiet cores",
     "smoke": "a few minutes, to see that everything works",
     "shipped": "for policies like those in the package: one to two hours (an estimate)",
+    "any_gait": "one network for gaits drawn at random: half an hour to an hour (an estimate)",
     "paper": "as arXiv 2505.08574 does: a day (an estimate)",
 }
 """Name -> what it is for, and how long it takes."""
