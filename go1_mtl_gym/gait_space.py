@@ -8,7 +8,7 @@ import numpy as np
 
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.gaits import Gait
-from go1_mtl_gym.validation import finite_vector, number_in
+from go1_mtl_gym.validation import finite_vector, integer_in, number_in, one_of
 
 OTHER_SIDE = (1, 0, 3, 2)
 """The leg on the other side of each of FL, FR, RL, RR."""
@@ -18,6 +18,9 @@ Span = tuple[float, float]
 """Smallest and largest value."""
 SPANS = ("period", "duty", "swing_height", "stance_width", "body_height")
 """Figures of a gait that a space bounds."""
+LARGEST_HOLE = 0.15
+"""Larger ones around all named gaits would leave little between them [cycles]."""
+_SEQUENCE = 0x6A175
 _MIDDLE: dict[str, Any] = {"period": 0.4, "duty": 0.5, "offsets": (0.0, 0.0, 0.0, 0.0)}
 
 
@@ -82,9 +85,12 @@ class GaitSpace:
         patterns: share of draws whose offsets are near those of a gait of `NAMED`, rather than anywhere.
         pattern_spread: standard deviation of their distance from it, of each leg [cycles].
         uneven: share of draws whose legs have different duties.
+        count: only so many gaits are drawn, the same ones by everybody who asks for as many or more; None for any.
+        holes: names of gaits of `NAMED` whose neighborhood is never drawn.
+        hole_radius: `offset_distance` at which it ends [cycles].
 
     Raises:
-        InvalidInputError: if a bound is none of a `Gait`, or out of order.
+        InvalidInputError: if a bound is none of a `Gait`, or out of order, or another figure is not as described.
     """
 
     period: Span = (0.30, 0.65)
@@ -96,6 +102,9 @@ class GaitSpace:
     patterns: float = 0.4
     pattern_spread: float = 0.15
     uneven: float = 0.2
+    count: int | None = None
+    holes: tuple[str, ...] = ()
+    hole_radius: float = 0.07
 
     def __post_init__(self) -> None:
         """Check the bounds, and make tuples of what came."""
@@ -110,12 +119,29 @@ class GaitSpace:
         number_in(self.pattern_spread, 0.0, 1.0, "pattern_spread of a GaitSpace [cycles]")
         for name in ("patterns", "uneven"):
             number_in(getattr(self, name), 0.0, 1.0, f"{name} of a GaitSpace")
+        if self.count is not None:
+            integer_in(self.count, 1, 10**9, "count of a GaitSpace")
+        if isinstance(self.holes, str):
+            raise InvalidInputError(f"holes of a GaitSpace must be names of gaits, got {self.holes!r}")
+        object.__setattr__(
+            self, "holes", tuple(one_of(name, tuple(NAMED), "hole of a GaitSpace") for name in self.holes)
+        )
+        number_in(self.hole_radius, 0.0, LARGEST_HOLE, "hole_radius of a GaitSpace [cycles]")
 
     def draw(self, rng: np.random.Generator) -> Gait:
         """A gait of the space, with its clock's zero where it can stand, if it can.
 
         Everything is uniform between its bounds, but for offsets that are drawn near a pattern.
         """
+        if self.count is not None:
+            rng = np.random.default_rng((_SEQUENCE, int(rng.integers(self.count))))
+        while True:
+            gait = self._drawn(rng)
+            if all(offset_distance(gait, NAMED[name]) > self.hole_radius for name in self.holes):
+                return gait
+
+    def _drawn(self, rng: np.random.Generator) -> Gait:
+        """A draw that may lie in a hole."""
         values = {name: float(rng.uniform(*getattr(self, name))) for name in SPANS}
         offsets = rng.uniform(0.0, 1.0, 4)
         patterned, which, spread = rng.uniform(), int(rng.integers(len(NAMED))), rng.standard_normal(4)

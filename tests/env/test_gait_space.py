@@ -79,6 +79,19 @@ def test_draws_are_the_same_for_the_same_generator_and_count():
     assert first == second and len(set(first)) == 5
 
 
+def test_only_so_many_gaits_are_drawn_and_the_first_ones_of_more():
+    few, more = (set(draws(300, GaitSpace(count=count))) for count in (5, 20))
+    assert (len(few), len(more)) == (5, 20) and few < more
+
+
+def test_nothing_is_drawn_from_holes():
+    space = GaitSpace(holes=tuple(NAMED), patterns=1.0, pattern_spread=0.05)
+    for gait in draws(100, space):
+        assert min(offset_distance(gait, known) for known in NAMED.values()) > space.hole_radius
+    near = [offset_distance(gait, NAMED["trot"]) for gait in draws(200, GaitSpace(patterns=1.0, pattern_spread=0.02))]
+    assert min(near) < 0.03
+
+
 def test_most_gaits_can_stand_where_their_clock_begins():
     gaits = draws(300)
     could = [stands_somewhere(gait) for gait in gaits]
@@ -143,6 +156,10 @@ def test_clipping_brings_a_gait_into_the_space():
         ({"uneven": "often"}, "uneven of a GaitSpace"),
         ({"duty_offset": -0.1}, "duty_offset of a GaitSpace"),
         ({"body_height": (0.5, 1.0)}, "body_height"),
+        ({"count": 0}, "count of a GaitSpace"),
+        ({"holes": "trot"}, "holes of a GaitSpace must be names of gaits"),
+        ({"holes": ("moonwalk",)}, "hole of a GaitSpace must be one of 'walk'"),
+        ({"hole_radius": 0.4}, "hole_radius of a GaitSpace"),
     ],
 )
 def test_impossible_spaces_are_refused(values, message):

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from go1_mtl_gym.gait_space import GaitSpace
 from trainers.cli.names import ChannelName, GaitName, PresetName
 from trainers.cli.options import PROGRAM, Unless, parse, said, unchecked, values_of
 from trainers.data.operator import OperatorConfig
@@ -14,12 +15,14 @@ from trainers.pipeline.presets import ABOUT
 from trainers.utils.cli import program
 
 _Hands: Any = unchecked(OperatorConfig)
+_Gaits: Any = unchecked(GaitSpace)
 _Settings: Any = unchecked(
     JobConfig,
     preset=PresetName,
     tasks=tuple[GaitName, ...],
     channels=tuple[ChannelName, ...],
     operator=_Hands | None,
+    gaits=_Gaits,
 )
 _Folder = Unless[Path]
 _FIRST = ("preset", "out")
@@ -37,6 +40,7 @@ def _values(settings: JobConfig) -> dict[str, Any]:
     fields = {each.name: getattr(settings, each.name) for each in dataclasses.fields(settings)}
     return fields | {
         "operator": hands,
+        "gaits": _Gaits(**dataclasses.asdict(settings.gaits)),
         "preset": PresetName(settings.preset),
         "tasks": GaitName.each(settings.tasks),
         "channels": ChannelName.each(settings.channels),

@@ -12,9 +12,10 @@ import numpy as np
 from go1_mtl_gym import BUILT_IN_TASKS, DomainRandomization
 from go1_mtl_gym.env_config import DEFAULT_CHANNELS, DEFAULT_HISTORY
 from go1_mtl_gym.errors import InvalidInputError
+from go1_mtl_gym.gait_space import GaitSpace
 from go1_mtl_gym.sensing.observation import CHANNELS
 from go1_mtl_gym.tasks import ANY_GAIT, check_task_names
-from go1_mtl_gym.validation import interval_s, number_in, one_of
+from go1_mtl_gym.validation import interval_s, number_in, one_of, parameters_of
 from trainers.algorithms.config import BCConfig, DAggerConfig, PhaseConfig
 from trainers.data.environments import PerturbationConfig
 from trainers.data.operator import OperatorConfig
@@ -90,6 +91,7 @@ class JobConfig:
         round_episodes: episodes per task after each DAgger round.
         round_video_s: length of the film of every round in the log; 0 makes none.
         video_s: length of the videos.
+        gaits: that are drawn where the one task is "any_gait".
         wandb: whether to log to Weights & Biases too, with the package of that name.
 
     Raises:
@@ -140,6 +142,7 @@ class JobConfig:
     round_video_s: float = _from(0, 2.0)
     video_s: float = _from(0, 4.0, above=True)
     wandb: bool = False
+    gaits: GaitSpace = GaitSpace()
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
@@ -152,6 +155,7 @@ class JobConfig:
         one_of(str(self.device).partition(":")[0], DEVICES, "device")
         if isinstance(self.operator, Mapping):
             object.__setattr__(self, "operator", OperatorConfig(**self.operator))
+        object.__setattr__(self, "gaits", parameters_of(self.gaits, GaitSpace, "gaits"))
         for name in ("randomized", "corner_fraction"):
             number_in(getattr(self, name), 0.0, 1.0, name)
         if self.phase_free_s and self.has_clock and self.phase_free_history < self.history:
@@ -197,7 +201,7 @@ class JobConfig:
     def env_kwargs(self) -> dict[str, Any]:
         """Of the environments that demonstrations are collected in and policies act in."""
         names = ("tasks", "channels", "history", "control_hz", "kp", "kd")
-        return {name: getattr(self, name) for name in names}
+        return {name: getattr(self, name) for name in (*names, *(["gaits"] if self.is_any_gait else []))}
 
     @property
     def literal_env_kwargs(self) -> dict[str, Any]:
