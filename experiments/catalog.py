@@ -26,6 +26,8 @@ STUDIES = {
     "student_budget": "experiments.student.budget:Budget",
     "student_ppo": "experiments.student.ppo:ReinforcementLearning",
     "student_phase_free": "experiments.student.phase_free:PhaseFree",
+    "any_gait_expert": "experiments.any_gait.expert_map:ExpertMap",
+    "any_gait_student": "experiments.any_gait.student:Student",
     "paper_simulation": "experiments.paper.study:Simulation",
     "paper_hardware": "experiments.paper.study:Hardware",
     "paper_hardware_half_noise": "experiments.paper.study:HalfNoise",

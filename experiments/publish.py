@@ -46,6 +46,7 @@ PAGES = {
         "The student", "student_", "Policies beside the expert, each in the environment that it was made for."
     ),
     "new_gaits": Page("New gaits for a trained policy", "new_gaits", "What it takes to teach a policy one more gait."),
+    "any_gait": Page("Any gait", "any_gait_", "The space of gaits, and one network for all of it."),
     "paper": Page(
         "The paper's tables",
         "paper_",
