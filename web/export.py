@@ -150,7 +150,8 @@ def constants(contract: PolicyContract) -> dict[str, Any]:
 
 
 def _task(task: Any) -> dict[str, Any]:
-    gait = dataclasses.asdict(task.gait) | {"can_stand": task.gait.can_stand, "change_phase": task.gait.change_phase}
+    followed = {name: getattr(task.gait, name) for name in ("duties", "can_stand", "change_phase")}
+    gait = dataclasses.asdict(task.gait) | followed
     return {name: getattr(task, name) for name in ("command_range", "command_limit", "push_limit")} | {"gait": gait}
 
 

@@ -25,5 +25,5 @@ export function passes(mark, before, after) {
 
 /** Which legs should be on the ground. */
 export function stance(gait, phase) {
-  return gait.offsets.map((offset) => modulo(phase + offset, 1) < gait.duty);
+  return gait.offsets.map((offset, leg) => modulo(phase + offset, 1) < gait.duties[leg]);
 }
