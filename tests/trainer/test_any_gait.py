@@ -74,6 +74,14 @@ def test_the_preset_has_one_head_no_baselines_and_changes_gaits():
     assert config.perturbation(0.06).operator.task_interval is not None
 
 
+def test_any_gait_can_be_certified_tours_included():
+    certificate = trainers.certify(
+        "expert", tasks=(ANY_GAIT,), conditions=("operator", "tour"), episodes=1, seconds=1.0, tours=1, tour_seconds=2.0
+    )
+    assert certificate.settings.gaits == (ANY_GAIT,)
+    assert [(cell.condition.name, cell.survived) for cell in certificate.cells] == [("operator", 1), ("tour", 1)]
+
+
 @pytest.mark.slow
 def test_the_main_job_learns_any_gait(tmp_path):
     config = trainers.JobConfig.from_preset(
