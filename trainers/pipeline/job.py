@@ -1,7 +1,7 @@
 """The main job: stages that leave their results on disk, and take from there what is done."""
 
 import contextlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -16,30 +16,25 @@ from trainers.algorithms.phase_free import train_phase_free
 from trainers.data.collection import collect_all
 from trainers.data.demonstrations import Demonstrations
 from trainers.data.environments import base_env, make_env, make_venv
-from trainers.evaluation.closed_loop import evaluate
 from trainers.evaluation.figures import joint_target_figure
-from trainers.evaluation.metrics import lower_bound, offline_metrics
 from trainers.pipeline.baselines import baseline_names, train_baselines
 from trainers.pipeline.config import NOISE_RAD, JobConfig
 from trainers.pipeline.demonstrations import held_out_jobs, training_jobs
 from trainers.pipeline.new_policy import new_policy
 from trainers.pipeline.pictures import save_small_video, save_videos
 from trainers.pipeline.run_folder import RunFolder
+from trainers.pipeline.scores import DRAWN, OPERATOR, Scores, certified, means
 from trainers.pipeline.stages import Stages, announced_if_slow
 from trainers.policies.checkpoint import versions
 from trainers.policies.loading import load
 from trainers.policies.multi_head import MultiHeadPolicy
-from trainers.utils.files import json_ready, read_object, write_json
+from trainers.utils.files import write_json
 from trainers.utils.gif import Gif
 from trainers.utils.logging import log_figure, log_film, log_round, log_settings, log_text, make_logger
 from trainers.utils.wandb_log import check_wandb
 
-DRAWN, OPERATOR = "drawn", "operator"
-"""Where commands come from in the closed loop: the task's range, or hands."""
 ANY_GAIT_ENVS = 6
 """Environments of a DAgger round in which the gait can be any."""
-IN_HANDS = ("success_rate", "survival_rate", "velocity_error")
-"""What ``metrics.json`` tells of the episodes in an operator's hands."""
 
 
 class Job:
@@ -74,6 +69,7 @@ class Job:
             check_wandb()
         self.folder = RunFolder(Path(out))
         self.folder.claim(config)
+        self._scores = Scores(config, self.folder, progress)
         self.stages = Stages(config, progress, self.folder.seconds)
         self.logger = make_logger(self.folder.log, ("tensorboard", "wandb") if config.wandb else ("tensorboard",))
         log_text(self.logger, "configuration", config.as_dict())
@@ -163,9 +159,11 @@ class Job:
         agent = f"round-{round_num}"
         episodes = self.config.round_episodes
         protocol = DRAWN if self.config.operator is None else OPERATOR
-        closed_loop = {task: self.closed_loop(policy, agent, task, episodes, protocol) for task in self.config.tasks}
+        closed_loop = {
+            task: self._scores.closed_loop(policy, agent, task, episodes, protocol) for task in self.config.tasks
+        }
         step = self._steps_after(round_num)
-        log_round(self.logger, step, closed_loop, certified=_certified(closed_loop.values()))
+        log_round(self.logger, step, closed_loop, certified=certified(closed_loop.values()))
         if self.config.round_video_s:
             with contextlib.suppress(RenderingError):  # said once, where the other pictures are drawn
                 path = self.folder.film(round_num)
@@ -216,11 +214,11 @@ class Job:
             policies: by the names that `clone`, `phase_free` and `baselines` give them.
             held_out: rows that none of them learned from.
         """
-        tasks = self._one_step_errors(policies, held_out)
+        tasks = self._scores.one_step_errors(policies, held_out)
         with self._stage("evaluation"):
             for name, policy in {"expert": "expert", **policies}.items():
                 for task in self.config.tasks:
-                    tasks[task].setdefault(name, {}).update(self._scores(policy, name, task))
+                    tasks[task].setdefault(name, {}).update(self._scores.of(policy, name, task))
         metrics = {
             "tasks": tasks,
             "config": self.config.as_dict(),
@@ -230,65 +228,8 @@ class Job:
             "command": self.command,
         }
         write_json(self.folder.metrics, metrics)
-        log_settings(self.logger, self.config.as_dict(), _means(tasks), self._steps_after(self.config.rounds))
+        log_settings(self.logger, self.config.as_dict(), means(tasks), self._steps_after(self.config.rounds))
         return metrics
-
-    def _one_step_errors(
-        self, policies: Mapping[str, Any], held_out: Demonstrations
-    ) -> dict[str, dict[str, dict[str, Any]]]:
-        """Task -> policy -> metric."""
-        tasks: dict[str, dict[str, dict[str, Any]]] = {task: {} for task in self.config.tasks}
-        for name, policy in policies.items():
-            if name == "phase_free":  # these rows hold one frame, it needs several
-                continue
-            rows = held_out.select() if name == "paper_literal" else held_out
-            for task, scores in offline_metrics(policy, rows).items():
-                tasks[task][name] = scores
-        return tasks
-
-    def _scores(self, policy: Any, agent: str, task: str) -> dict[str, Any]:
-        """With drawn commands; and, by names that begin with "operator", in an operator's hands, if there is one."""
-        episodes = self.config.episodes
-        scores = self.closed_loop(policy, agent, task, episodes, DRAWN)
-        if self.config.operator is None:
-            return scores
-        hands = self.closed_loop(policy, agent, task, episodes, OPERATOR)
-        return scores | {f"{OPERATOR}_{name}": hands[name] for name in IN_HANDS}
-
-    def closed_loop(self, policy: Any, agent: str, task: str, episodes: int, protocol: str = DRAWN) -> dict[str, Any]:
-        """Scores of `trainers.evaluate`, kept on disk; "episodes" is their number.
-
-        Args:
-            policy: as `trainers.evaluate` takes it.
-            agent: its name in the run.
-            task: name of the task.
-            episodes: how many.
-            protocol: `DRAWN`, commands that change at times, or `OPERATOR`, the hands of the configuration in one gait.
-        """
-        path = self.folder.closed_loop(agent, task, protocol)
-        known = read_object(path, "file of scores") if path.is_file() else None
-        if known is None:
-            known = self._measured(policy, task, episodes, protocol) | {"learner": agent}
-            write_json(path, known)
-        kept = {key: value for key, value in known.items() if key not in ("task", "learner", "episodes", "seconds")}
-        return kept | {"episodes": len(known["episodes"])}
-
-    def _measured(self, policy: Any, task: str, episodes: int, protocol: str) -> dict[str, Any]:
-        config = self.config
-        operator = config.operator.of_one_gait() if protocol == OPERATOR and config.operator else None
-        result = evaluate(
-            policy,
-            task,
-            episodes=episodes,
-            seconds=config.episode_s,
-            seed=config.seed + 1,
-            command_interval=None if operator else config.command_interval,
-            operator=operator,
-            n_jobs=config.n_envs,
-            progress=self.progress,
-            **(config.env_kwargs if policy == "expert" else {}),
-        )
-        return json_ready(result.as_dict())
 
     # -- Pictures ------------------------------------------------------------------------------------------------------
 
@@ -329,22 +270,3 @@ class Job:
 
     def _untrained(self) -> MultiHeadPolicy:
         return new_policy(self.config, self.config.env_kwargs)
-
-
-def _certified(closed_loop: Iterable[Mapping[str, Any]]) -> dict[str, float]:
-    """What a certificate would say of the episodes of all gaits together: success rate and its lower bound, at 95 %."""
-    scores = list(closed_loop)
-    trials = sum(each["episodes"] for each in scores)
-    successes = sum(round(each["success_rate"] * each["episodes"]) for each in scores)
-    return {"success_rate": successes / trials, "lower_bound": lower_bound(successes, trials)}
-
-
-def _means(tasks: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> dict[str, float]:
-    """What runs are compared by: the policy's means over its gaits."""
-    wanted = {"success": "success_rate", "in_hands": "operator_success_rate", "r2": "r2"}
-    scores = [learners["multi_head"] for learners in tasks.values()]
-    return {
-        f"result/{name}": sum(each[key] for each in scores) / len(scores)
-        for name, key in wanted.items()
-        if all(each.get(key) is not None for each in scores)
-    }
