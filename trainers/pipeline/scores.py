@@ -42,7 +42,7 @@ class Scores:
         return tasks
 
     def of(self, policy: Any, agent: str, task: str) -> dict[str, Any]:
-        """Those with drawn commands; if there is an operator, those in its hands by names that begin with "operator"."""
+        """Those with drawn commands; if there is an operator, those in its hands too, by names that begin with it."""
         episodes = self.config.episodes
         scores = self.closed_loop(policy, agent, task, episodes, DRAWN)
         if self.config.operator is None:
