@@ -6,12 +6,12 @@ from trainers.pipeline.config import JobConfig
 
 # Core seconds on the machine of docs/results/main_job.md, from the wall times there; the guess wants no more precision
 # than that, since the first stages correct it for the machine at hand.
-EXPERT_S, POLICY_S, ROUND_S = 0.40, 0.19, 0.34
+EXPERT_S, POLICY_S, ROUND_S = 0.13, 0.065, 0.16
 """Per second of robot time: the expert drives, a policy does, both do in a round (all gaits side by side)."""
-STEP_S, PHASE_STEP_S = 0.023, 0.03
+STEP_S, PHASE_STEP_S = 0.018, 0.016
 """Per gradient step of a network of `STEP_WIDTH` units with a batch of `STEP_BATCH`; of the phase estimator."""
 STEP_WIDTH, STEP_BATCH = 256, 1024
-FILM_S, SMALL_FILM_S = 1.0, 0.5
+FILM_S, SMALL_FILM_S = 0.5, 0.3
 """Per second of film, and of a small one."""
 BEGIN_S = 3.0
 """Of every stage: processes begin, files are read."""
@@ -46,7 +46,7 @@ def parts(config: JobConfig) -> dict[str, Parts]:
         out["phase_free"] = {"watch": (1, BEGIN_S + watched_s), "phase": (1, PHASE_STEP_S * config.phase_free_steps)}
     steps = config.clone_steps + config.rounds * config.round_steps
     if not config.is_any_gait:
-        out["baselines"] = {"baselines": (1, BEGIN_S + 2 * step_s * steps * (1.25 if workers > 1 else 1.0))}
+        out["baselines"] = {"baselines": (1, BEGIN_S + step_s * steps * (1 if workers > 1 else 2))}
     agents = 2 if config.is_any_gait else AGENTS
     out["evaluation"] = {"evaluate": (agents * gaits * hands, 1.2 * config.episodes * episodes_s)}
     out["pictures"] = {"videos": (1, BEGIN_S + FILM_S * gaits * config.video_s)}
