@@ -123,7 +123,8 @@ class Episode:
             self._begin(change.wanted, 0.0, time_s)
         if self.gait_slew is not None:
             self.task = any_gait_task(self.gait_slew.at(time_s))
-            self.gait_slew = None if self.gait_slew.is_over(time_s) else self.gait_slew
+            if self.gait_slew.is_over(time_s):
+                self.phase, self.gait_slew = (self.phase + self.gait_slew.shift) % 1.0, None
         followed = self.command if self.gait_change is None else self.gait_change.slowed(self.command)
         self.filtered_command = filtered(followed, self.filtered_command, seconds)
 
@@ -185,12 +186,12 @@ class Episode:
             slew_s: how long the old one takes to become it [s]; with 0 it begins at once, at the phase that fits best,
                 or at rest if it can rest where the old one does.
         """
-        if slew_s > 0:
-            self.gait_slew = GaitSlew(self.task.gait, gait, self.time_s, slew_s)
-            return
         resting = is_standing(self.task.gait, self.phase, self.filtered_command) and gait.can_stand
         phase = 0.0 if resting else fitting_phase(self.task.gait, self.phase, gait)
-        self._begin(any_gait_task(gait), phase, -np.inf)
+        if slew_s > 0:
+            self.gait_slew = GaitSlew(self.task.gait, gait, self.time_s, slew_s, phase - self.phase)
+        else:
+            self._begin(any_gait_task(gait), phase, -np.inf)
 
     def _begin(self, task: Task, phase: float, since_s: float) -> None:
         self.task, self.phase, self.gait_change, self.task_since_s = task, phase, None, since_s

@@ -1,6 +1,6 @@
 """From any gait to any other."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,23 +15,29 @@ PHASES = 128
 class GaitSlew:
     """A gait that becomes another one bit by bit, its clock running on.
 
+    Offsets go the short way round. By how much all of them together are shifted is of no account to the feet, so the
+    way leads to the wanted gait as it would be with another zero of its clock; at the end the clock is set right.
+
     Attributes:
         first: the gait that it was.
         wanted: the one that it will be.
         since_s: when it began to change, since the reset [s].
         seconds: how long that takes [s].
+        shift: what the clock gains at the end, when the wanted gait has its own offsets again [cycles].
     """
 
     first: Gait
     wanted: Gait
     since_s: float
     seconds: float
+    shift: float = 0.0
 
     def at(self, time_s: float) -> Gait:
         """The gait at a time since the reset [s]."""
         if self.is_over(time_s):
             return self.wanted
-        return between(self.first, self.wanted, (time_s - self.since_s) / self.seconds)
+        turned = replace(self.wanted, offsets=tuple(np.mod(np.array(self.wanted.offsets) + self.shift, 1.0)))
+        return between(self.first, turned, (time_s - self.since_s) / self.seconds)
 
     def is_over(self, time_s: float) -> bool:
         """Whether the gait is the wanted one, at a time since the reset [s]."""

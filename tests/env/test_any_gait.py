@@ -209,3 +209,27 @@ def test_a_slew_begins_and_ends_at_its_gaits():
     assert slew.at(2.5) == CANTER and slew.is_over(2.5) and not slew.is_over(2.4)
     periods = [slew.at(2.0 + 0.05 * i).period for i in range(11)]
     assert (np.diff(periods) > 0).all()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_legs_do_not_jump_on_the_way_from_one_gait_to_another(env, seed):
+    rng = np.random.default_rng(seed)
+    first, second = (env.config.gaits.draw(rng) for _ in range(2))
+    env.reset(seed=0, options={"gait": first, "command": (0.3, 0.0, 0.0)})
+    walk(env, 10 + seed)
+    legs = [env.task.gait.leg_phase(env.state.phase)]
+    env.set_gait(second, 0.5)
+    for _ in range(40):
+        env.step(env.expert_action())
+        legs.append(env.task.gait.leg_phase(env.state.phase))
+    assert env.task.gait == second
+    gained = np.mod(np.diff(legs, axis=0) + 0.5, 1.0) - 0.5
+    fastest = 0.02 / min(first.period, second.period) + 0.02 / 0.5 * 0.5  # the clock, and half a turn in half a second
+    assert np.abs(gained).max() <= fastest + 1e-9
+
+
+def test_a_slew_from_a_stand_is_one_that_stands(env):
+    env.reset(seed=0, options={"gait": NAMED["trot"], "command": (0.0, 0.0, 0.0)})
+    walk(env, 10)
+    env.set_gait(NAMED["pace"], 0.4)
+    assert walk(env, 40)["standing"] and env.task.gait == NAMED["pace"] and env.state.phase == 0.0
