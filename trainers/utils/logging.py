@@ -53,7 +53,7 @@ class TensorBoard(KVWriter):
             writer = self._writers[task]
             values = {tag: key_values[key] for key, tag in tags.items()}
             films = {tag: values.pop(tag) for tag, value in list(values.items()) if isinstance(value, Gif)}
-            writer.write(values, {tag: key_excluded.get(key, ()) for key, tag in tags.items()}, step)
+            writer.write(values, {tag: key_excluded.get(key, ()) for key, tag in tags.items() if tag in values}, step)
             for tag, film in films.items():  # stable-baselines3's own films need moviepy, to become just such a file
                 image = Summary.Image(height=film.height, width=film.width, encoded_image_string=film.content)
                 summary = Summary(value=[Summary.Value(tag=tag, image=image)])
