@@ -7,6 +7,7 @@ import uuid
 from pathlib import Path
 from typing import Any
 
+import PIL.Image
 from stable_baselines3.common.logger import Figure, HParam, Image, KVWriter, Video
 
 from go1_mtl_gym.errors import InvalidInputError
@@ -84,7 +85,9 @@ class WeightsAndBiases(KVWriter):
     def _form(self, value: Any) -> Any:
         """A value as Weights & Biases takes it."""
         if isinstance(value, Figure):
-            return self._wandb.Image(value.figure)
+            drawn = io.BytesIO()  # drawn here: the package knows figures of pyplot's alone
+            value.figure.savefig(drawn, format="png")
+            return self._wandb.Image(PIL.Image.open(drawn))
         if isinstance(value, Image):
             return self._wandb.Image(value.image)
         if isinstance(value, Gif):
