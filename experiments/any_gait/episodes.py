@@ -1,6 +1,6 @@
 """Gaits that nobody was trained on, and episodes in them."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import gymnasium
@@ -8,16 +8,26 @@ import numpy as np
 
 import trainers
 from experiments.results import Record
+from experiments.study import Cell
 from go1_mtl_gym import Gait, GaitSpace
-from go1_mtl_gym.env_config import ANY_GAIT_CHANNELS
 from go1_mtl_gym.tasks import ANY_GAIT
 from trainers.data.environments import derive_seed
 from trainers.data.operator import OperatorConfig
 from trainers.evaluation.episodes import EpisodeSetup
 from trainers.evaluation.scoring import EpisodeRecord
 
-EXPERT_WORLD: dict[str, Any] = {"channels": ANY_GAIT_CHANNELS}
-"""Arguments of the environment that the expert is measured in."""
+
+def blocks(counts: Mapping[str, int], size: int) -> list[Cell]:
+    """Cells of so many episodes each, by the name of what they are; `block_of` reads them."""
+    return [
+        Cell(ANY_GAIT, f"{name}, from {first} on") for name, many in counts.items() for first in range(0, many, size)
+    ]
+
+
+def block_of(cell: Cell) -> tuple[str, int]:
+    """Name and number of the first episode of a cell of `blocks`."""
+    name, _, first = cell.condition.partition(", from ")
+    return name, int(first.removesuffix(" on"))
 
 
 def held_out_gaits(space: GaitSpace, first: int, count: int, seed: int) -> Iterator[tuple[int, Gait]]:
@@ -55,7 +65,7 @@ def episode(
     """
     interval = None if operator is not None else 5.0
     setup = EpisodeSetup(ANY_GAIT, derive_seed("any gait", *seed), seconds, None, interval, False, operator, gait)
-    kwargs = {**getattr(policy, "env_kwargs", EXPERT_WORLD), **world}
+    kwargs = {**getattr(policy, "env_kwargs", {}), **world}
     return setup.play(policy, kwargs, trainers.make_env, watch)[0]
 
 

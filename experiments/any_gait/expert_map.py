@@ -9,13 +9,12 @@ from matplotlib.figure import Figure
 
 from experiments import plots
 from experiments.agents import EXPERT, Agent
-from experiments.any_gait.episodes import episode, figures, held_out_gaits, record
+from experiments.any_gait.episodes import block_of, blocks, episode, figures, held_out_gaits, record
 from experiments.results import Record, Results
 from experiments.stats import Rate
 from experiments.study import EVALUATION_CODE, Cell, Study, option
 from experiments.tables import count, markdown, number
 from go1_mtl_gym import GaitSpace
-from go1_mtl_gym.tasks import ANY_GAIT
 from trainers.data.operator import OperatorConfig
 
 INSIDE, AROUND = "declared space", "around it"
@@ -52,12 +51,10 @@ class ExpertMap(Study):
         return [Agent(EXPERT)]
 
     def cells(self, agent: Agent) -> list[Cell]:
-        blocks = range(0, self.options.gaits, self.options.block)
-        return [Cell(ANY_GAIT, f"{space}, from {first} on") for space in SPACES for first in blocks]
+        return blocks(dict.fromkeys(SPACES, self.options.gaits), self.options.block)
 
     def measure(self, agent: Agent, cell: Cell, seed: int) -> list[dict[str, Any]]:
-        name, _, first = cell.condition.partition(", from ")
-        begin = int(first.removesuffix(" on"))
+        name, begin = block_of(cell)
         many = min(self.options.block, self.options.gaits - begin)
         hands = OperatorConfig().of_one_gait()
         found = []

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from experiments.agents import EXPERT, Agent
-from experiments.any_gait.episodes import MovedSliders, episode, figures, held_out_gaits, record
+from experiments.any_gait.episodes import MovedSliders, block_of, blocks, episode, figures, held_out_gaits, record
 from experiments.results import Group, Record, Results, group
 from experiments.study import EVALUATION_CODE, Cell, Study, option
 from experiments.tables import count, markdown, number
@@ -71,15 +71,10 @@ class Student(Study):
             CHANGING: self.options.changing,
             SLIDERS: self.options.sliders,
         }
-        return [
-            Cell(ANY_GAIT, f"{name}, from {first} on")
-            for name, many in counts.items()
-            for first in range(0, many, self.options.block)
-        ]
+        return blocks(counts, self.options.block)
 
     def measure(self, agent: Agent, cell: Cell, seed: int) -> list[dict[str, Any]]:
-        name, _, first = cell.condition.partition(", from ")
-        begin, options = int(first.removesuffix(" on")), self.options
+        (name, begin), options = block_of(cell), self.options
         policy, found = agent.load(), []
         many = {RANDOM: options.gaits, CHANGING: options.changing, SLIDERS: options.sliders}.get(name, options.named)
         for number_, drawn in held_out_gaits(GaitSpace(), begin, min(options.block, many - begin), seed):
