@@ -238,6 +238,11 @@ def check_reset_options(
     return task, command, gait
 
 
+def gait_can_change(tasks: tuple[str, ...]) -> bool:
+    """Whether an environment of these tasks has more than one gait."""
+    return len(tasks) > 1 or tasks == (ANY_GAIT,)
+
+
 def check_gait(gait: object, task: str | None) -> Gait:
     """Return a gait that a task may be given.
 

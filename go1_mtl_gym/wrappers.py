@@ -8,7 +8,7 @@ import numpy as np
 from go1_mtl_gym.deprecation import renamed_arguments
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.seeded_wrapper import SeededWrapper
-from go1_mtl_gym.tasks import ANY_GAIT, TASKS, Task, any_gait_task
+from go1_mtl_gym.tasks import ANY_GAIT, TASKS, Task, any_gait_task, gait_can_change
 from go1_mtl_gym.validation import finite_vector, interval_s, number_in
 
 NOISE_CORRELATION_S = 0.1
@@ -63,7 +63,7 @@ class PerturbationWrapper(SeededWrapper):
         self._command_interval = interval_s(command_interval, "command_interval")
         self._corner_fraction = number_in(corner_fraction, 0.0, 1.0, "corner_fraction")
         self._task_interval = interval_s(task_interval, "task_interval")
-        if task_interval is not None and len(self._go1.tasks) < 2 and self._go1.tasks != (ANY_GAIT,):
+        if task_interval is not None and not gait_can_change(self._go1.tasks):
             raise InvalidInputError(f"task_interval must be None for an environment of one task, got {task_interval}")
 
     def reset(

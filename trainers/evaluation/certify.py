@@ -13,7 +13,7 @@ from tqdm.auto import tqdm
 
 from go1_mtl_gym import BUILT_IN_TASKS, TASKS
 from go1_mtl_gym.errors import InvalidInputError
-from go1_mtl_gym.tasks import ANY_GAIT
+from go1_mtl_gym.tasks import ANY_GAIT, gait_can_change
 from go1_mtl_gym.validation import one_of
 from trainers.data.environments import EnvFactory, make_env
 from trainers.evaluation.agents import identity, opened
@@ -119,14 +119,9 @@ def _known(agent: Any, chosen: tuple[str, ...] | None) -> tuple[str, ...]:
     return tuple(dict.fromkeys((*BUILT_IN_TASKS, *(chosen or ())))) if own is None else tuple(own)
 
 
-def _has_changes(gaits: tuple[str, ...]) -> bool:
-    """Whether a tour can lead from one gait to another."""
-    return len(gaits) > 1 or gaits == (ANY_GAIT,)
-
-
 def _conditions(given: Sequence[str | Condition] | None, known: tuple[str, ...]) -> list[Condition]:
     if given is None:
-        return [each for each in CONDITIONS.values() if _has_changes(known) or not each.is_tour]
+        return [each for each in CONDITIONS.values() if gait_can_change(known) or not each.is_tour]
     if isinstance(given, str) or not given:
         raise InvalidInputError(f"conditions must be a sequence of names or Condition, got {given!r}")
     found = [
@@ -146,7 +141,7 @@ def _check(asked: Sequence[tuple[Condition, str]], settings: Settings, agent: An
         if task != ALL_GAITS:
             one_of(task, settings.gaits, "task that the policy knows")
             continue
-        if not _has_changes(settings.gaits):
+        if not gait_can_change(settings.gaits):
             raise InvalidInputError(f"tours lead through several gaits, and the policy knows {settings.gaits} alone")
         theirs = settings.arguments(other, condition)["tasks"] if other is not None else settings.gaits
         if tuple(theirs) != tuple(settings.arguments(agent, condition)["tasks"]):

@@ -14,7 +14,7 @@ from go1_mtl_gym.env_config import DEFAULT_CHANNELS, DEFAULT_HISTORY
 from go1_mtl_gym.errors import InvalidInputError
 from go1_mtl_gym.gait_space import GaitSpace
 from go1_mtl_gym.sensing.observation import CHANNELS
-from go1_mtl_gym.tasks import ANY_GAIT, check_task_names
+from go1_mtl_gym.tasks import ANY_GAIT, check_task_names, gait_can_change
 from go1_mtl_gym.validation import interval_s, number_in, one_of, parameters_of
 from trainers.algorithms.config import BCConfig, DAggerConfig, PhaseConfig
 from trainers.data.environments import PerturbationConfig
@@ -225,7 +225,7 @@ class JobConfig:
             noise_rad: largest standard deviation of the noise on actions [rad].
             hard_push_interval: mean time between the hard pushes of the operator, if there is one [s].
         """
-        operator, several = self.operator, len(self.tasks) > 1 or self.is_any_gait
+        operator, several = self.operator, gait_can_change(self.tasks)
         if operator is not None:
             operator = dataclasses.replace(
                 operator if several else operator.of_one_gait(),
